@@ -22,6 +22,7 @@ KINDS = (
     "closed",  # a gripper closed: `object` is what it touched (note "touching") or what was nearest
     "approached",  # a gripper came near `object`, touching or not
     "clutter_moved",  # `object`, which is none of the task's, was pushed, lifted or knocked over
+    "began",  # demonstrations alone: the expert's call `note` on `object` begins
 )
 
 

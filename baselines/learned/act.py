@@ -47,7 +47,7 @@ NEAR_HOME = 0.2
 AROUND = 0.02
 """A gripper that closes so far [m] beside an object's box takes it."""
 EMPTY = 0.4
-"""One that holds something is open by more than this share of its width."""
+"""One that holds something is open by more than this share of its width, from shut on."""
 SAME = 0.15
 """What is seen within this [m], colours' distance counted a tenth, is what was there before."""
 WAIT = 2.6
@@ -252,17 +252,22 @@ class Belief:
                     self.held[arm] = None
             before = row
         self.last = before
+        empty = {h.number for arm, h in enumerate(self.held) if h and self._shut(arm, observation)}
         for arm, hold in enumerate(self.held):
-            if hold is None:
-                continue
-            share = float(observation["state"][self.columns[arm].gripper])
-            if share < EMPTY * self.robot.arms[arm].gripper_value(hold.width):
+            if hold is not None and hold.number in empty:
                 self._put(hold.number, hold.before)
                 self.held[arm] = None
-            else:
-                self._put(
-                    hold.number, _pose(observation["ee"][arm].astype(float).tolist()) * hold.offset
-                )
+            elif hold is not None:
+                end = _pose(observation["ee"][arm].astype(float).tolist())
+                self._put(hold.number, end * hold.offset)
+
+    def _shut(self, arm: int, observation: Observation) -> bool:
+        """Whether the fingers of an arm that should hold something came together."""
+        own, hold = self.robot.arms[arm], self.held[arm]
+        width = hold.width if hold is not None else 0.0
+        shut, full = (own.gripper_value(w) for w in (own.gripper.gap, width))
+        share = float(observation["state"][self.columns[arm].gripper])
+        return share < shut + EMPTY * (full - shut)
 
     def _end(self, arm: int, row: Rows) -> Pose:
         return end_effector(self.chains[arm], row[self.columns[arm].body].astype(float).tolist())

@@ -179,9 +179,11 @@ class Learners:
     """Makes a policy for each connection; all share the networks."""
 
     def __init__(self, options: LearnedOptions) -> None:
+        folder = Path(options.path).expanduser() if options.path else WEIGHTS
+        if not folder.is_dir() or not any(folder.iterdir()):
+            raise FileNotFoundError(f"{folder} has no weights: robospa learn {folder} makes some")
         from robospa.baselines.learned import perceive, point
 
-        folder = Path(options.path).expanduser() if options.path else WEIGHTS
         pointer = point.load(folder)
         self._decide: Decide = pointer.next_step
         self._look: Look = told

@@ -96,6 +96,8 @@ class DemonstrationRun(trial.TrialState):
     """A trial that goes on when its goal is met or lost; from then on no events are noted."""
 
     decided: bool = False
+    call: object = None
+    """What the expert is doing; every call that it begins is noted as an event."""
 
     def start(self) -> bool:
         self.clutter = None  # it is noted in evaluations alone
@@ -113,6 +115,17 @@ class DemonstrationRun(trial.TrialState):
     def has(self, kind: str) -> bool:
         """True if an event of this kind has happened."""
         return any(event.kind == kind for event in self.events)
+
+    def next(self, expert: Expert) -> Rows:
+        """The expert's next actions."""
+        rows = expert.next(self.world.snapshot())
+        if expert.call is not self.call:
+            self.call = expert.call
+            name = getattr(self.call, "object", getattr(self.call, "tool", ""))
+            began = Event(self.physics_steps / RATE, "began", name, note=type(self.call).__name__)
+            self.events.append(began)
+            self.event_steps.append(len(self.actions))
+        return rows
 
     def act(self, rows: Rows) -> None:
         """Execute joint actions."""
@@ -156,7 +169,7 @@ def run_expert(run: DemonstrationRun, expert: Expert) -> Demonstration:
     ends it.
     """
     while not expert.finished and not run.has("failed"):
-        rows = expert.next(run.world.snapshot())
+        rows = run.next(expert)
         if expert.plan_done:
             if run.actions:
                 run.act(np.repeat(run.actions[-1][None], REST_ACTIONS, axis=0))
@@ -290,7 +303,7 @@ def _go_wrong(run: DemonstrationRun, name: str) -> tuple[Demonstration, float]:
     wrong_from: float | None = None
     still = 0
     while not run.has("failed") and still < STILL:
-        rows = expert.next(run.world.snapshot())
+        rows = run.next(expert)
         if wrong_from is None and expert.went_wrong:
             wrong_from = run.physics_steps / RATE
         alone = len(rows) == 1 and (not run.actions or np.array_equal(rows[0], run.actions[-1]))
@@ -307,7 +320,7 @@ def _from_the_middle(
     world, rng = run.world, generator_of(key, "before")
     expert = changed_plans.ChangedExpert(run.parts.scene, world.snapshot(), plan, rng)
     while not (expert.finished or expert.begun or run.has("failed")):
-        rows = expert.next(world.snapshot())
+        rows = run.next(expert)
         if expert.begun:
             run.recorder = recorder
             recorder.started(world)

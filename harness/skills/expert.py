@@ -65,6 +65,8 @@ class Expert:
         """True once no call of the plan is left, only the way home of empty arms."""
         self.finished = False
         """True once that is done, too."""
+        self.call: object = None
+        """The call of the plan that was begun last: what is being done."""
         self._steps = self._run(task(scene.task).plan(scene) if plan is None else plan)
         self._started = False
 
@@ -96,8 +98,10 @@ class Expert:
                     and follow.object == call.object
                 ):
                     left.pop(0)
+                    self.call = follow
                     yield from self._move(call, follow)
                 else:
+                    self.call = call
                     yield from self._single(call)
             except SkillFailed as error:
                 self.failures.append(str(error))

@@ -85,6 +85,8 @@ def test_it_says_what_happened(made: EpisodeAttempt, episode: DatasetEpisode) ->
     assert episode.sim_time[0] == 0 and (np.diff(episode.sim_time) > 0).all()
     assert len(episode.subtasks) == 1 and set(episode.subtask) == {0, -1}
     assert [event.index for event in episode.events if event.kind == "subtask_done"] == [0]
+    (began,) = (event for event in episode.events if event.kind == "began")
+    assert (began.time, began.note) == (0.0, "Press")
     assert episode.scene_digest and episode.replay_digest == made.digest
 
 
