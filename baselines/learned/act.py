@@ -46,8 +46,12 @@ NEAR_HOME = 0.2
 """An arm whose joints are all so close [rad] to home hides nothing."""
 AROUND = 0.02
 """A gripper that closes so far [m] beside an object's box takes it."""
+SHUT = 0.02
+"""A gripper that is told to close is told to close wholly."""
 EMPTY = 0.4
 """One that holds something is open by more than this share of its width, from shut on."""
+BESIDE = ((0.0, 0.0), (0.006, 0.0), (-0.006, 0.0), (0.0, 0.006), (0.0, -0.006))
+"""Where a thing is grasped that was missed: so far [m] beside where it seems to be, in turn."""
 SAME = 0.15
 """What is seen within this [m], colours' distance counted a tenth, is what was there before."""
 WAIT = 2.6
@@ -194,6 +198,8 @@ class Belief:
         self.state = State(tuple(Tracked(one, one) for one in seen))
         self.poses = [pose_of(one) for one in seen]
         self.held: list[Hold | None] = [None, None]
+        self.misses: dict[int, int] = {}
+        """How often a gripper closed on nothing where an object seemed to be."""
         self.last: Rows | None = None
         """What was commanded last (D,)."""
 
@@ -245,7 +251,7 @@ class Belief:
         for row in rows:
             for arm, c in enumerate(self.columns):
                 old, new = float(before[c.gripper]), float(row[c.gripper])
-                if self.held[arm] is None and new < old - 0.02 and target is not None:
+                if self.held[arm] is None and new < SHUT < old and target is not None:
                     self._close(arm, row, target)
                 elif self.held[arm] is not None and new > old + 0.02:
                     self._carry(arm, row)
@@ -253,6 +259,8 @@ class Belief:
             before = row
         self.last = before
         empty = {h.number for arm, h in enumerate(self.held) if h and self._shut(arm, observation)}
+        for number in empty:
+            self.misses[number] = self.misses.get(number, 0) + 1
         for arm, hold in enumerate(self.held):
             if hold is not None and hold.number in empty:
                 self._put(hold.number, hold.before)
@@ -333,7 +341,9 @@ class Belief:
             old.add(i)
             new.add(k)
             items[i] = replace(items[i], now=seen[k], visible=True)
-            self.poses[i] = pose_of(seen[k])
+            x, y, z = pose_of(seen[k]).position
+            dx, dy = BESIDE[self.misses.get(i, 0) % len(BESIDE)]
+            self.poses[i] = Pose((x + dx, y + dy, z), pose_of(seen[k]).rotation)
         for i in set(range(len(items))) - old:
             items[i] = replace(items[i], visible=False)
         for k in set(range(len(seen))) - new:

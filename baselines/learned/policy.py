@@ -112,7 +112,9 @@ class Learned:
     def _end(self, belief: Belief) -> None:
         """Note what came of the steps; try again what failed."""
         assert self._expert is not None
-        failed = self._missed(belief, self._steps[0]) or "; ".join(self._expert.failures)
+        failed = "; ".join(
+            filter(None, (self._missed(belief, self._steps[0]), *self._expert.failures))
+        )
         self.log += [(step, failed) for step in self._steps]
         self._expert = None
         self._tries += 1
