@@ -58,6 +58,8 @@ WAIT = 2.6
 """Seconds until what hides the cue is there [s]; official: 2."""
 TURN_AT_ONCE = 0.2
 """Only so far [m] from the middle or more can an arm make half a turn at once."""
+WIDE, ROOM = 0.08, 0.105
+"""What is as wide [m] carries others; where one arm hands over to the other is room about [m]."""
 LIFTS = {"kitchen_pot": 0.11}
 LIFT, RISE = 0.08, 0.10
 """How high [m] things are lifted: to be set down again, and to go elsewhere."""
@@ -119,7 +121,9 @@ def calls_of(steps: Sequence[Step], state: State) -> list[object]:
             drop = [calls.Pick(name, arm="left"), calls.Drop(name, on, arm="left")]
             if item.now.place[0] <= 0:
                 return list(drop)
-            over = calls.Place(name, (*_exchange(state, step.object), TABLE_TOP), arm="right")
+            over = calls.Place(
+                name, (*free_place(state, step.object, EXCHANGE, ROOM), TABLE_TOP), arm="right"
+            )
             return [calls.Pick(name, arm="right"), over, *drop]
         case "turn" | "back" | "move":
             return _moved(step, state)
@@ -153,8 +157,9 @@ def _moved(step: Step, state: State) -> list[object]:
         on = calls.Place(name, (0.0, 0.0, up), on=str(step.destination), drop=drop)
         return [calls.Pick(name, max(LIFT, min(0.16, top + 0.06))), on]
     assert step.place is not None
-    z = support_height(state.objects, step.place, item.now)
-    return [calls.Pick(name, LIFT), calls.Place(name, (*step.place, z + low))]
+    place = free_place(state, step.object, step.place)
+    z = support_height(state.objects, place, item.now)
+    return [calls.Pick(name, LIFT), calls.Place(name, (*place, z + low))]
 
 
 def _quarter(turn: float) -> float:
@@ -162,18 +167,25 @@ def _quarter(turn: float) -> float:
     return round(turn / (math.pi / 2)) * math.pi / 2
 
 
-def _exchange(state: State, but: int) -> tuple[float, float]:
-    """Where one arm puts down what the other takes: the free place that is nearest to the usual."""
-    others = [o.now.place for i, o in enumerate(state.objects) if i != but and o.visible]
+def free_place(
+    state: State, but: int, wanted: tuple[float, float], room: float = 0.0
+) -> tuple[float, float]:
+    """The place nearest to the one that is wanted on which nothing lies but what carries others;
+    `room` [m] away from everything, or as far as it takes."""
+    half = state.objects[but].now.half
+    taken = [
+        (o.now.place, max(room, 0.45 * sum((*half[:2], *o.now.half[:2]))))
+        for i, o in enumerate(state.objects)
+        if i != but and o.visible and max(o.now.half[:2]) < WIDE
+    ]
 
     def cost(point: tuple[float, float]) -> float:
-        near = min((math.dist(point, other[:2]) for other in others), default=1.0)
-        return max(0.0, 0.105 - near) * 10 + math.dist(point, EXCHANGE)
+        tight = max((far - math.dist(point, at[:2]) for at, far in taken), default=0.0)
+        return max(0.0, tight) * 10 + math.dist(point, wanted)
 
     steps = range(-6, 7)
     return min(
-        ((EXCHANGE[0] + 0.0125 * i, EXCHANGE[1] + 0.0125 * j) for i in steps for j in steps),
-        key=cost,
+        ((wanted[0] + 0.0125 * i, wanted[1] + 0.0125 * j) for i in steps for j in steps), key=cost
     )
 
 
