@@ -37,8 +37,7 @@ fast: ## Tests without simulator
 sim: ## Tests that run the simulator
 	$(BIN)/pytest -m sim $(SPREAD)
 
-learn: install ## Train the learned reference anew, from nothing, in runs/learned (needs torch; a night of two cores)
-	$(BIN)/pip install -q torch --index-url https://download.pytorch.org/whl/cpu
+learn: install ## Train the learned reference anew, in runs/learned (needs torch; a night of two cores)
 	$(BIN)/robospa learn runs/learned
 
 test-models: install-dev ## LeRobot: tiny policies served, data sets loaded; in .venv-models (Python 3.12)

@@ -1,7 +1,8 @@
 """`robospa demo`: an oracle server on loopback, evaluated over the wire, ten tasks of the 56.
 
 Shows the whole way in a minute or two: server, handshake, seeded trials, records, table, report
-with videos. A policy that moves at random follows on some of the same trials, if time is left.
+with videos. The learned reference follows, if torch is installed and time is left, and shows how it
+fails; without torch arms that move at random, on some of the same trials.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Annotated
 
@@ -31,7 +33,6 @@ SAMPLE = (
     "Remember_Color_Cover",
 )  # fmt: skip
 """One task of each category."""
-CONTRAST = "random"
 
 
 def demo(
@@ -45,7 +46,7 @@ def demo(
         int, typer.Option(callback=PROCESSES, help="worker processes; 0 for one per core")
     ] = 0,
     video: Annotated[str, typer.Option(help="as in `robospa eval`")] = "first",
-    contrast: Annotated[bool, typer.Option(help="also evaluate a random policy")] = True,
+    contrast: Annotated[bool, typer.Option(help="also evaluate the learned policy")] = True,
     seconds: Annotated[
         float, typer.Option(callback=SECONDS, help="leave the contrast out after that time")
     ] = 75.0,
@@ -58,12 +59,16 @@ def demo(
     folder = out or new_folder("demo")
     names = parse_tasks(",".join(SAMPLE) if tasks == "sample" else tasks)
     page = _evaluate("oracle", _select(names, levels, trials), folder / "oracle", workers, video)
-    # The tasks with the shortest trials: one pick each.
-    short = [name for name in names if name in parse_tasks("spatial")]
+    # At random the tasks with the shortest trials: one pick each.
+    learned = find_spec("torch") is not None
+    short = names if learned else [name for name in names if name in parse_tasks("spatial")]
     if contrast and short and time.monotonic() - started < seconds:
-        chosen = _select(short, str(min(parse_levels(levels))), trials)
-        print("\nFor contrast, some of the same trials with arms that move at random:")
-        _evaluate(CONTRAST, chosen, folder / CONTRAST, workers, "none")
+        chosen = _select(short, str(max(parse_levels(levels))), trials)
+        policy, what = (
+            ("learned", "the learned reference") if learned else ("random", "random motion")
+        )
+        print(f"\nFor contrast, some of the same trials with {what}:")
+        _evaluate(policy, chosen, folder / policy, workers, video if learned else "none")
     print(f"\nDone in {time.monotonic() - started:.0f} s. Open {page} in a browser.")
 
 
