@@ -12,6 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
+import numpy as np
+
 from robospa.geometry import Pose, Vec3, rotate, yaw_rotation
 from robospa.tasks import plan as calls
 from robospa.tasks.catalog import task
@@ -19,7 +21,7 @@ from robospa.tasks.environment_state import main_color
 from robospa.tasks.objects import model_of, object_model, variant_count
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.shapes import Color, ObjectModel
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import HEIGHT, TABLE_TOP, WIDTH, WORKCELL
 
 TYPES = (
     *("pick", "move", "back", "turn", "drop", "press", "stamp", "dock"),
@@ -264,13 +266,20 @@ def _covers(seen: Seen, place: Sequence[float]) -> bool:
     return abs(c * dx + s * dy) < seen.half[0] and abs(c * dy - s * dx) < seen.half[1]
 
 
+def in_picture(seen: Seen) -> bool:
+    """Whether its middle is in the head camera's picture."""
+    x, y, z = (np.array(v) for v in seen.place)
+    column, row = WORKCELL.head.pixel(x, y, z + seen.half[2])
+    return bool(0 < column < WIDTH and 0 < row < HEIGHT)
+
+
 def is_wall(seen: Seen) -> bool:
     """Whether it is the wall that hides what is behind it."""
     return seen.kind == "block" and seen.half[2] > 0.15 and seen.half[1] < 0.015
 
 
 def hidden(state: State) -> State:
-    """The state with what nobody can see: behind a wall, under a cover."""
+    """The state with what nobody can see: behind a wall, under a cover, out of the picture."""
     walls = [o.now for o in state.objects if is_wall(o.now)]
     covers = [o.now for o in state.objects if o.now.kind == "cover"]
 
@@ -278,6 +287,7 @@ def hidden(state: State) -> State:
         now = item.now
         behind = any(now.place[1] > w.place[1] + w.half[1] for w in walls)
         under = any(now is not c and math.dist(now.place, c.place) < 0.03 for c in covers)
-        return not behind and not under and not (item.acts and now.place[2] < TABLE_TOP - 0.1)
+        gone = item.acts > 0 and now.place[2] < TABLE_TOP - 0.1
+        return in_picture(now) and not (behind or under or gone)
 
     return replace(state, objects=tuple(replace(o, visible=seen(o)) for o in state.objects))
