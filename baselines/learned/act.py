@@ -81,6 +81,25 @@ def objects_of(row: Rows) -> list[Seen]:
     return found
 
 
+NEEDS = {"hang": ("handle", "hang"), "hit": ("head", "press"), "pour": ("support", "support")}
+"""The frames that object and destination of a step of a type must have."""
+ALONE = ("pick", "press", "open", "lift", "back", "move")
+"""Types of steps that need no destination."""
+
+
+def possible(step: Step, state: State) -> bool:
+    """Whether a step can be tried at all."""
+    if step.type == "wait" or step.type == "done":
+        return True
+    if step.object is None or step.object == step.destination:
+        return False
+    if step.destination is None:
+        return step.type in ALONE and (step.type != "move" or step.place is not None)
+    own, other = NEEDS.get(step.type, ("support", "support"))
+    things = (state.objects[step.object].now, state.objects[step.destination].now)
+    return own in model(things[0]).frames and other in model(things[1]).frames
+
+
 def calls_of(steps: Sequence[Step], state: State) -> list[object]:
     """The skill calls that do equal `steps`, one after the other, on objects named by number."""
     step, count = steps[0], len(steps)

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from robospa.baselines.learned.act import Belief, Rows, calls_of, objects_of
+from robospa.baselines.learned.act import Belief, Rows, calls_of, objects_of, possible
 from robospa.baselines.learned.steps import Seen, State, Step, Tracked, after
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.embodiment import Embodiment
@@ -100,14 +100,21 @@ class Learned:
         self._expert.workspace.held = held
 
     def _chain(self, state: State) -> list[Step]:
-        steps = [self._decide(state, self._sentence)]
+        steps = [self._next(state)]
         while steps[0].type in REPEATED and len(steps) < AT_ONCE:
             state = after(state, steps[-1])
-            more = self._decide(state, self._sentence)
+            more = self._next(state)
             if more.type != steps[0].type or not _alike(more, steps[0]):
                 break
             steps.append(more)
         return steps
+
+    def _next(self, state: State) -> Step:
+        """The next step; done where that is nothing that can be tried, and after a pick: whoever is
+        asked to pick is asked for nothing else."""
+        picked = bool(state.done) and state.done[-1].type == "pick"
+        step = Step("done") if picked else self._decide(state, self._sentence)
+        return step if possible(step, state) else Step("done")
 
     def _end(self, belief: Belief) -> None:
         """Note what came of the steps; try again what failed."""
