@@ -52,6 +52,8 @@ EMPTY = 0.4
 """One that holds something is open by more than this share of its width, from shut on."""
 BESIDE = ((0.0, 0.0), (0.006, 0.0), (-0.006, 0.0), (0.0, 0.006), (0.0, -0.006))
 """Where a thing is grasped that was missed: so far [m] beside where it seems to be, in turn."""
+NEARLY = 0.015
+"""What is seen so near [m] to where it was believed to be is taken to be in the middle."""
 SAME = 0.15
 """What is seen within this [m], colours' distance counted a tenth, is what was there before."""
 WAIT = 2.6
@@ -371,10 +373,11 @@ class Belief:
                 continue
             old.add(i)
             new.add(k)
-            items[i] = replace(items[i], now=seen[k], visible=True)
-            x, y, z = pose_of(seen[k]).position
+            now = _mean(items[i].now, seen[k])
+            items[i] = replace(items[i], now=now, visible=True)
+            x, y, z = pose_of(now).position
             dx, dy = BESIDE[self.misses.get(i, 0) % len(BESIDE)]
-            self.poses[i] = Pose((x + dx, y + dy, z), pose_of(seen[k]).rotation)
+            self.poses[i] = Pose((x + dx, y + dy, z), pose_of(now).rotation)
         for i in set(range(len(items))) - old:
             items[i] = replace(items[i], visible=False)
         for k in set(range(len(seen))) - new:
@@ -397,6 +400,15 @@ def _unlike(item: Tracked, one: Seen) -> float:
     near = math.dist(item.now.place, one.place)
     look = 0.1 * math.dist(item.first.color, one.color) + math.dist(item.first.half, one.half)
     return near + look if near < SAME or look < 0.03 else math.inf
+
+
+def _mean(believed: Seen, seen: Seen) -> Seen:
+    """What is seen, half way to where it was believed to be if that is near."""
+    near = math.dist(believed.place, seen.place)
+    if near > NEARLY:
+        return seen
+    (ax, ay, az), (bx, by, bz) = believed.place, seen.place
+    return replace(seen, place=((ax + bx) / 2, (ay + by) / 2, (az + bz) / 2), half=believed.half)
 
 
 def _pose(row: Sequence[float]) -> Pose:
