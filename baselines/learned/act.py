@@ -395,9 +395,10 @@ class Belief:
 
 def _unlike(item: Tracked, one: Seen) -> float:
     """How little `one` is like the object; infinite for another one."""
-    if item.now.kind != one.kind:
-        return math.inf
     near = math.dist(item.now.place, one.place)
+    if item.now.kind != one.kind:  # taken for something else, as large and in the same place
+        mistaken = near < NEARLY and math.dist(item.first.half, one.half) < NEARLY
+        return 1.0 + near if mistaken else math.inf
     look = 0.1 * math.dist(item.first.color, one.color) + math.dist(item.first.half, one.half)
     return near + look if near < SAME or look < 0.03 else math.inf
 
@@ -406,9 +407,10 @@ def _mean(believed: Seen, seen: Seen) -> Seen:
     """What is seen, half way to where it was believed to be if that is near."""
     near = math.dist(believed.place, seen.place)
     if near > NEARLY:
-        return seen
+        return replace(seen, kind=believed.kind)
     (ax, ay, az), (bx, by, bz) = believed.place, seen.place
-    return replace(seen, place=((ax + bx) / 2, (ay + by) / 2, (az + bz) / 2), half=believed.half)
+    place = ((ax + bx) / 2, (ay + by) / 2, (az + bz) / 2)
+    return replace(seen, kind=believed.kind, place=place, half=believed.half)
 
 
 def _pose(row: Sequence[float]) -> Pose:
