@@ -25,6 +25,7 @@ ALLOWED = {
         "protocol",
         "tasks",
         "harness.skills",
+        "harness.sim",
         "harness.robots",
         "harness.demonstrations",
         "harness.datasets",

@@ -1,0 +1,324 @@
+"""The recipe: lessons and pictures made, then two parts trained, by one command that goes on where
+it was stopped. Needs torch, and Pillow and the simulator's renderer for pictures.
+
+Every batch is a function of the training's seed and the step, so a resumed training makes the very
+steps that one in a piece would.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, wait
+from dataclasses import asdict, dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import torch
+from msgspec import Meta
+from numpy.typing import NDArray
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from robospa.baselines.learned import scenes
+from robospa.baselines.learned.perceive import (
+    FindNetwork,
+    MeasureNetwork,
+    find_losses,
+    measure_losses,
+    save_weights,
+)
+from robospa.baselines.learned.point import (
+    FIRST_WORD,
+    UNKNOWN,
+    Batch,
+    PointNetwork,
+    Vocabulary,
+    batch_of,
+    cell_places,
+    vocabulary_of,
+)
+from robospa.baselines.learned.scenes import NOTHING, SEEN_WIDTH, Lesson, Pictures
+from robospa.baselines.learned.steps import KINDS
+from robospa.harness.running.atomic_file import replace_file
+from robospa.protocol.options import option
+from robospa.tasks.scene import SUITE
+
+Count = Annotated[int, Meta(ge=1)]
+BATCH, PICTURES, EVERY = 64, 16, 200
+"""States and pictures of a step; a line, and what can be gone on from, after so many steps."""
+POINT_RATE, PERCEIVE_RATE, QUICK = 1.5e-3, 2e-3, 0.7
+"""Learning rates; perception is trained at lower precision in so large a share of its steps."""
+BLOCK = KINDS.index("block")
+
+
+@dataclass(frozen=True)
+class TrainOptions:
+    """How much is made and learned."""
+
+    blocks: Count = option(60, "lessons of so many scenes of each variant")
+    pictures: Count = option(48, "so many pictures of each variant")
+    point: Count = option(14_000, "steps of what chooses the next step")
+    find: Count = option(6_000, "steps of what finds objects in pictures")
+    measure: Count = option(12_000, "steps of what measures them")
+    seed: int = option(0, "seed of weights and batches")
+
+
+class Training:
+    """Steps of one network, kept in `folder` so that they can be gone on with."""
+
+    def __init__(
+        self, folder: Path, name: str, network: nn.Module, steps: int, rate: float
+    ) -> None:
+        self._path, self._name, self._network = folder / f"{name}.pt", name, network
+        self._steps, self.done, self.shown = steps, 0, dict[str, float]()
+        self._optimizer = torch.optim.AdamW(network.parameters(), rate, weight_decay=0.01)
+        warm = 0.02 * steps
+
+        def share(step: int) -> float:
+            return min(1.0, (step + 1) / warm) * (0.02 + 0.98 * (1 - step / steps))
+
+        self._schedule = torch.optim.lr_scheduler.LambdaLR(self._optimizer, share)
+        if self._path.exists():
+            kept = torch.load(self._path, weights_only=True)
+            network.load_state_dict(kept["network"])
+            self._optimizer.load_state_dict(kept["optimizer"])
+            self._schedule.load_state_dict(kept["schedule"])
+            self.done = kept["done"]
+
+    def run(
+        self, losses: Callable[[int], Mapping[str, Tensor]], say: Callable[[str], None]
+    ) -> None:
+        """All steps that are left; `losses` of a step are summed."""
+        self._network.train()
+        begun, start = self.done, time.monotonic()
+        while self.done < self._steps:
+            parts = losses(self.done)
+            self._optimizer.zero_grad(set_to_none=True)
+            sum(parts.values(), torch.zeros(())).backward()
+            nn.utils.clip_grad_norm_(self._network.parameters(), 2.0)
+            self._optimizer.step()
+            self._schedule.step()
+            self.done += 1
+            for name, value in parts.items():
+                self.shown[name] = 0.98 * self.shown.get(
+                    name, float(value.detach())
+                ) + 0.02 * float(value.detach())
+            if self.done % EVERY == 0 or self.done == self._steps:
+                self._keep()
+                rate = (self.done - begun) / (time.monotonic() - start)
+                left = (self._steps - self.done) / rate / 60
+                told = ", ".join(f"{name} {value:.3f}" for name, value in self.shown.items())
+                where = f"{self._name} {self.done:,}/{self._steps:,}"
+                say(f"{where}: {told}; {rate:.1f}/s, {left:.0f} min left")
+        self._network.eval()
+
+    def _keep(self) -> None:
+        stream = io.BytesIO()
+        parts = {"network": self._network, "optimizer": self._optimizer, "schedule": self._schedule}
+        kept = {name: part.state_dict() for name, part in parts.items()}
+        torch.save({**kept, "done": self.done}, stream)
+        replace_file(self._path, stream.getvalue())
+
+
+# -- the next step ------------------------------------------------------------------------------
+
+
+class States:
+    """The states of all lessons, drawn at random: each variant equally often."""
+
+    def __init__(self, lessons: Sequence[Lesson], vocabulary: Vocabulary) -> None:
+        self._lessons, self._vocabulary = lessons, vocabulary
+        count = np.bincount([item.variant for item in lessons], minlength=len(scenes.variants()))
+        weight = np.array([1 / count[item.variant] for item in lessons])
+        states = np.array([len(item.tokens) for item in lessons])
+        weight *= np.where(states > 1, 2.0, 1.0)
+        self._reached = np.cumsum(weight / weight.sum())
+        self._told = [np.stack([vocabulary.numbers(s) for s in item.told]) for item in lessons]
+
+    def draw(self, rng: np.random.Generator, count: int) -> tuple[Batch, Tensor]:
+        """`count` states, seen and told a little wrongly, and their answers (B, 6)."""
+        chosen = np.searchsorted(self._reached, rng.random(count))
+        lessons = [self._lessons[min(int(i), len(self._lessons) - 1)] for i in chosen]
+        which = [int(rng.integers(len(item.tokens))) for item in lessons]
+        words = [
+            told[int(rng.integers(len(told)))]
+            for told in (self._told[min(int(i), len(self._told) - 1)] for i in chosen)
+        ]
+        tokens = [item.tokens[i] for item, i in zip(lessons, which, strict=True)]
+        last = np.stack([item.last[i] for item, i in zip(lessons, which, strict=True)])
+        batch = batch_of(
+            [misseen(rng, t) for t in tokens], misheard(rng, np.stack(words)), last.astype(np.int64)
+        )
+        answers = np.stack([item.answers[i] for item, i in zip(lessons, which, strict=True)])
+        return batch, torch.from_numpy(answers)
+
+
+def misheard(rng: np.random.Generator, words: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Sentences (B, L), some with words that are not known."""
+    share = rng.choice([0.0, 0.05, 0.15], size=(len(words), 1))
+    return np.where((words >= FIRST_WORD) & (rng.random(words.shape) < share), UNKNOWN, words)
+
+
+WRONG = np.array([0, 0.003, 0.003, 0.002, 0.0012, 0.0012, 0.0012, 0.05, 0.02, 0.02, 0.02, 0.02])
+"""How wrong the numbers of a `Seen` are at most, one standard deviation."""
+
+
+def misseen(rng: np.random.Generator, tokens: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Objects (N, TOKEN_WIDTH) as somebody sees them who may err."""
+    made, strength = tokens.copy(), rng.random()
+    errors = rng.normal(size=(2, len(tokens), SEEN_WIDTH)) * WRONG * strength
+    if rng.random() < 0.5:
+        errors[1] = errors[0]
+    for i, error in enumerate(errors):
+        rows = made[:, i * SEEN_WIDTH : (i + 1) * SEEN_WIDTH]
+        there = rows[:, 4] > 0
+        rows += np.where(there[:, None], error, 0).astype(np.float32)
+        rows[:, 4:7] = np.where(there[:, None], rows[:, 4:7].clip(0.002), 0)
+        quarter = np.where(there & (rows[:, 0] == BLOCK), rng.integers(4, size=len(rows)), 0)
+        rows[:, 7] += quarter * (np.pi / 2)
+        odd = quarter % 2 == 1
+        rows[odd, 4:6] = rows[odd, 5:3:-1]
+    return made
+
+
+def point_losses(network: PointNetwork, batch: Batch, answers: Tensor) -> dict[str, Tensor]:
+    """Of the type, the object, the destination, the place, and the reference where there is one."""
+    kind, chosen, goal, refers = (answers[:, i].long() for i in (0, 1, 2, 5))
+    told = network(batch)
+    losses = {"type": F.cross_entropy(told.type, kind)}
+    acts = chosen != NOTHING
+    losses["object"] = _cross(told.object, chosen, acts)
+    liked = network.goal_of(told, batch, kind, chosen.clamp(min=0))
+    nowhere = torch.where(goal == NOTHING, liked.shape[1] - 1, goal)
+    losses["goal"] = _cross(liked, nowhere, acts)
+    placed = ~answers[:, 3].isnan()
+    if placed.any():
+        some = Batch(
+            *(part[placed] for part in (batch.tokens, batch.real, batch.words, batch.last))
+        )
+        parts = told.features
+        few = type(told)(
+            told.type,
+            told.object,
+            told.hops,
+            (parts[0][placed], parts[1][placed], parts[2][placed]),
+        )
+        heat = network.heat_of(few, some, chosen[placed])
+        losses["place"] = (
+            0.3
+            * (-(heat.log_softmax(dim=1) * near(answers[placed, 3:5])).sum(dim=1)).sum()
+            / len(answers)
+        )
+    hops = [_cross(told.hops[:, i], refers, refers != NOTHING) for i in range(told.hops.shape[1])]
+    losses["reference"] = 0.3 * sum(hops, torch.zeros(()))
+    return losses
+
+
+def _cross(liked: Tensor, right: Tensor, counts: Tensor) -> Tensor:
+    each = F.cross_entropy(liked, right.clamp(min=0), reduction="none")
+    return (each * counts).mean()
+
+
+def near(places: Tensor) -> Tensor:
+    """(B, cells): how near cells are to places (B, 2), in shares of 1."""
+    away = (torch.from_numpy(cell_places())[None] - places[:, None]).square().sum(dim=2)
+    return (-away / (2 * 0.012**2)).softmax(dim=1)
+
+
+# -- the whole ----------------------------------------------------------------------------------
+
+
+def say(text: str) -> None:
+    """Tell how it gets on, at once."""
+    print(text, flush=True)
+
+
+def _lower() -> None:
+    """A worker leaves the machine to others, and takes one core."""
+    os.nice(5)
+    torch.set_num_threads(1)
+
+
+def _make(out: Path, kind: str, blocks: Sequence[int]) -> list[Path]:
+    return scenes.make(out / "made", kind, blocks, say)
+
+
+def _point(out: Path, options: TrainOptions) -> None:
+    paths = _make(out, "lessons", range(options.blocks))
+    lessons = [item for path in paths for item in scenes.read_lessons(path)]
+    vocabulary = Vocabulary(vocabulary_of(s for item in lessons for s in item.told))
+    states = States(lessons, vocabulary)
+    torch.manual_seed(options.seed)
+    network = PointNetwork(FIRST_WORD + len(vocabulary.words))
+
+    def losses(step: int) -> dict[str, Tensor]:
+        batch, answers = states.draw(np.random.default_rng([options.seed, step]), BATCH)
+        return point_losses(network, batch, answers)
+
+    Training(out, "point", network, options.point, POINT_RATE).run(losses, say)
+    save_weights(network, out / "point.npz")
+    replace_file(out / "words.json", json.dumps(vocabulary.words).encode())
+
+
+def _perceive(out: Path, name: str, options: TrainOptions) -> None:
+    shown = Pictures(_make(out, "pictures", range(options.pictures)))
+    torch.manual_seed(options.seed)
+    finds = name == "find"
+    network = FindNetwork() if finds else MeasureNetwork()
+    network.to(memory_format=torch.channels_last)
+    total = options.find if finds else options.measure
+
+    def losses(step: int) -> dict[str, Tensor]:
+        rng = np.random.default_rng([options.seed, step])
+        chosen = [int(i) for i in rng.integers(len(shown), size=PICTURES)]
+        chosen = [i for i in chosen if len(shown.seen[i])]
+        images, seen = [shown.image(i) for i in chosen], [shown.seen[i] for i in chosen]
+        quick = step < QUICK * total
+        if isinstance(network, FindNetwork):
+            return find_losses(network, images, seen, quick)
+        return measure_losses(network, rng, images, seen, quick)
+
+    Training(out, name, network, total, PERCEIVE_RATE).run(losses, say)
+    save_weights(network, out / f"{name}.npz")
+
+
+def train(out: Path, options: TrainOptions | None = None) -> None:
+    """The whole recipe, on two cores, into the folder `out`; what is there already is not made
+    again. The weights that `perceive.load` and `point.load` read, and their card, are left there.
+    """
+    options = options or TrainOptions()
+    begun = time.monotonic()
+    (out / "made").mkdir(parents=True, exist_ok=True)
+    halves = [range(k, options.pictures, 2) for k in (0, 1)]
+    with ProcessPoolExecutor(2, get_context("spawn"), _lower) as workers:
+        making = [workers.submit(_make, out, "pictures", half) for half in halves]
+        making.append(workers.submit(_make, out, "lessons", range(options.blocks)))
+        wait(making)
+        learning = [workers.submit(_perceive, out, name, options) for name in ("measure", "find")]
+        learning.append(workers.submit(_point, out, options))
+        for task in learning:
+            task.result()
+    card = card_of(out, options)
+    replace_file(out / "card.json", (json.dumps(card, indent=1) + "\n").encode())
+    say(f"done in {(time.monotonic() - begun) / 60:.0f} min: {out}")
+
+
+def card_of(out: Path, options: TrainOptions) -> dict[str, object]:
+    """What the weights in a folder say of themselves."""
+    files = [f"{name}.npz" for name in ("find", "measure", "point")] + ["words.json"]
+    hashes = {name: hashlib.sha256((out / name).read_bytes()).hexdigest() for name in files}
+    return {
+        "name": "learned",
+        "suite": SUITE,
+        "learned_from": "drawn scenes and their plans: training seeds, split train, seen textures",
+        "labels": "poses, sizes and kinds of the scenes' objects; steps of the expert's plans",
+        "options": asdict(options),
+        "sha256": hashes,
+    }
