@@ -34,8 +34,8 @@ LIKELY, APART = 0.35, 6.0
 AROUND = 48
 """Pixels along a side of what is seen sharply; twice that is seen from farther away."""
 BLOCK = KINDS.index("block")
-NUMBERS = 17
-"""Of a measurement: place 3, half sizes 3, turn 6, colour 3, hinge 1, and how sure the turn is."""
+NUMBERS = 16
+"""Of a measurement: place 3, half sizes 3, turn 6, colour 3, hinge 1."""
 NEAR, UNIT = 0.03, 0.02
 """The height above the table [m] in which a pixel is looked up, and the unit of offsets [m]."""
 
@@ -136,7 +136,7 @@ def plain(rows: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def labels_of(rows: NDArray[np.float32], pixels: NDArray[np.float64]) -> Tensor:
-    """(K, NUMBERS - 1): what the measuring network should say of `Seen` rows seen at pixels."""
+    """(K, NUMBERS): what the measuring network should say of `Seen` rows seen at pixels."""
     rows = plain(rows)
     near = (rows[:, 1:3] - table_place(pixels)) / UNIT
     turns = [f(k * rows[:, 7]) for k in (1, 2, 4) for f in (np.cos, np.sin)]

@@ -1,0 +1,62 @@
+"""Lessons and pictures: made from training seeds, kept in files, the same each time."""
+
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robospa.baselines.learned import scenes, steps
+from robospa.baselines.learned.scenes import SEEN_WIDTH, lesson, read_lessons, save_lessons
+from robospa.tasks.catalog import build_scene
+from robospa.tasks.seeds import FIRST_TRAINING_SEED, LAST_TRAINING_SEED
+from robospa.tasks.sentences import sentences
+
+STACK = build_scene("Stack_Blocks_Color_Order", 2, FIRST_TRAINING_SEED)
+FAR = build_scene("Pick_Mugs_Distance", 1, FIRST_TRAINING_SEED)
+
+
+def test_lessons_survive_their_file(tmp_path: Path) -> None:
+    made = [lesson(STACK), lesson(FAR)]
+    save_lessons(tmp_path / "lessons.npz", made)
+    for one, other in zip(made, read_lessons(tmp_path / "lessons.npz"), strict=True):
+        assert (one.told, one.variant) == (other.told, other.variant)
+        np.testing.assert_array_equal(one.answers, other.answers)
+        np.testing.assert_array_equal(np.concatenate(one.tokens), np.concatenate(other.tokens))
+
+
+def test_a_scene_is_told_by_its_training_sentences() -> None:
+    assert set(lesson(FAR).told) < set(sentences(FAR, "train"))
+
+
+def test_a_target_far_from_a_reference_has_the_reference_as_label() -> None:
+    target, refers = lesson(FAR).answers[0, [1, 5]]
+    names = [o.name for o in FAR.objects]
+    assert (names[int(target)], names[int(refers)]) == (FAR.facts["target"], FAR.facts["reference"])
+
+
+def test_scenes_are_of_training_seeds() -> None:
+    for scene in islice(scenes.scenes(3), 4):
+        assert FIRST_TRAINING_SEED <= scene.seed <= LAST_TRAINING_SEED
+
+
+def test_what_cannot_be_seen_has_no_numbers() -> None:
+    state = steps.labelled(build_scene("Observe_Blocks_Move_Memory", 1, FIRST_TRAINING_SEED))[1][0]
+    tokens = scenes.tokens_of(state)
+    for item, row in zip(state.objects, tokens, strict=True):
+        assert row[:SEEN_WIDTH].any() == item.visible
+    assert not all(item.visible for item in state.objects)
+
+
+def test_states_with_something_in_a_hand_are_not_drawn() -> None:
+    pairs = steps.labelled(build_scene("Hang_Mug_Stack_Blocks", 1, FIRST_TRAINING_SEED))
+    assert len(scenes.drawable(pairs)) < len(pairs)
+
+
+@pytest.mark.sim
+def test_a_picture_shows_each_object_where_it_is_said_to_be() -> None:
+    shown = scenes.picture(STACK, steps.labelled(STACK)[0][0])
+    assert shown.image.shape == (240, 320, 3) and len(shown.seen) == len(STACK.objects)
+    empty = shown.image[5, 160].astype(int)
+    for u, v in zip(*scenes.middle_pixel(shown.seen), strict=True):
+        assert np.abs(shown.image[int(v), int(u)].astype(int) - empty).max() > 20
