@@ -1,0 +1,400 @@
+"""Which step comes next: objects now and as first seen, a sentence and the steps done in, a step out.
+
+Four layers in turn. Each attends to the words anew (its *control*), scales and shifts the objects
+by what it read (FiLM, Perez et al. 2018), and compares them two by two; between layers a soft
+pointer hops to an object, and what lies how far and in which direction from there is fed back, so
+that "the second farthest from the red one" is one hop and one comparison. Answers are pointers, so
+there may be any number of objects in any order; a place is a heat map over the table, not a mean.
+Importing this module imports torch.
+
+Letters in comments: B states, N objects, L words, C channels.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from robospa.baselines.learned.perceive import load_weights
+from robospa.baselines.learned.scenes import NOTHING, SEEN_WIDTH, TOKEN_WIDTH, tokens_of
+from robospa.baselines.learned.steps import KINDS, TYPES, State, Step
+from robospa.workcell import TABLE_TOP
+
+WORD = re.compile(r"[a-z]+|[0-9]")
+EMPTY, UNKNOWN, FIRST_WORD = 0, 1, 2
+PIECES, MEANING = Path(__file__).parent / "weights" / "pieces.npz", 128
+LONGEST = 48
+"""Words of a sentence that are read."""
+COUNTED = 24
+"""Steps done are counted up to that."""
+HEADS, LAYERS = 4, 4
+LOW = -1e4
+"""The liking of what is not there."""
+CELL, ORIGIN, GRID = 0.01, (-0.40, -0.34), (80, 64)
+"""The heat map: the size of its cells [m], its corner, and cells along x and y."""
+WITH_GOAL = ("move", "turn", "drop", "stamp", "dock", "hang", "hit", "pour")
+"""Types of steps that have a destination; to move is also to move to a place."""
+
+
+def words_of(sentence: str) -> list[str]:
+    """The words of a sentence in lower case, digits one by one: "2nd" is "2", "nd"."""
+    return WORD.findall(sentence.lower())
+
+
+def vocabulary_of(sentences: Iterable[str], least: int = 1) -> tuple[str, ...]:
+    """All words that occur `least` times, the frequent ones first, then by the alphabet."""
+    count = Counter(word for sentence in sentences for word in words_of(sentence))
+    kept = (word for word in count if count[word] >= least)
+    return tuple(sorted(kept, key=lambda word: (-count[word], word)))
+
+
+@cache
+def _pieces() -> tuple[dict[str, int], NDArray[np.float32]]:
+    """Pieces of words, those that begin one with "\u2581", and a vector of MEANING for each: 128 main
+    components of the 256 numbers of wordllama (l2_supercat, MIT licence)."""
+    with np.load(PIECES) as kept:
+        names = kept["pieces"].tobytes().decode().split(" ")
+        return {name: i for i, name in enumerate(names)}, kept["vectors"] * kept["scale"]
+
+
+@cache
+def meaning(word: str) -> NDArray[np.float32]:
+    """(MEANING,): what a word means in general, of unit length: the mean of its longest pieces."""
+    numbers, vectors = _pieces()
+    left, found = "\u2581" + word, []
+    while left:
+        sizes = range(len(left), 0, -1)
+        size = next((n for n in sizes if left[:n] in numbers), 0)
+        if size:
+            found.append(vectors[numbers[left[:size]]])
+        left = left[max(size, 1) :]
+    mean = np.mean(found, axis=0) if found else np.zeros(MEANING, np.float32)
+    return np.asarray(mean / max(float(np.linalg.norm(mean)), 1e-6), np.float32)
+
+
+class Vocabulary:
+    """Sentences as rows of numbers: of the words that training knew, and what all words mean."""
+
+    def __init__(self, words: Sequence[str]) -> None:
+        self.words = tuple(words)
+        self._numbers = {word: FIRST_WORD + i for i, word in enumerate(self.words)}
+
+    def numbers(self, sentence: str) -> NDArray[np.int64]:
+        """(LONGEST,): the numbers of the first words, then EMPTY."""
+        found = [self._numbers.get(word, UNKNOWN) for word in words_of(sentence)[:LONGEST]]
+        return np.array(found + [EMPTY] * (LONGEST - len(found)), np.int64)
+
+    def meanings(self, sentence: str) -> NDArray[np.float32]:
+        """(LONGEST, MEANING): what the first words mean, then zeros."""
+        made = np.zeros((LONGEST, MEANING), np.float32)
+        for row, word in zip(made, words_of(sentence), strict=False):
+            row[:] = meaning(word)
+        return made
+
+    @cached_property
+    def table(self) -> NDArray[np.float32]:
+        """(FIRST_WORD + words, MEANING): the same by number."""
+        none = [np.zeros(MEANING, np.float32)] * FIRST_WORD
+        return np.stack([*none, *(meaning(word) for word in self.words)])
+
+
+@dataclass(frozen=True)
+class Batch:
+    """States: `tokens` (B, N, TOKEN_WIDTH), those of no object full of zeros and not `real`
+    (B, N); `words` (B, L) and what they mean (B, L, MEANING); `last` (B, 2): steps done and type of
+    the last one."""
+
+    tokens: Tensor
+    real: Tensor
+    words: Tensor
+    meanings: Tensor
+    last: Tensor
+
+
+def seen_features(rows: Tensor) -> Tensor:
+    """(..., SEEN_WIDTH) as (..., 19) numbers of about 1."""
+    x, y, z = rows[..., 1], rows[..., 2], rows[..., 3] - TABLE_TOP
+    half, turn = rows[..., 4:7], rows[..., 7]
+    there = (rows[..., 4] > 0).float()
+    turns = [f(k * turn) for k in (1, 2, 4) for f in (torch.cos, torch.sin)]
+    logs = torch.log(half.clamp(min=1e-3) / 0.03)
+    numbers = torch.stack([x / 0.2, y / 0.15, z / 0.05, *turns], dim=-1)
+    rest = [half / 0.03, logs, rows[..., 8:11] * 2, rows[..., 11:12]]
+    return torch.cat([numbers, *rest], dim=-1) * there[..., None]
+
+
+FEATURES = 19
+
+
+def relations(tokens: Tensor) -> Tensor:
+    """(B, N, N, 11): where the second object lies from the first, and how they differ."""
+    now, first = tokens[..., :SEEN_WIDTH], tokens[..., SEEN_WIDTH : 2 * SEEN_WIDTH]
+    rows = torch.where((now[..., 4:5] > 0), now, first)
+    way = (rows[:, None, :, 1:4] - rows[:, :, None, 1:4]) / 0.1
+    far = way[..., :2].norm(dim=-1, keepdim=True)
+    sizes = torch.log(rows[..., 4:7].clamp(min=1e-3))
+    unlike = (sizes[:, None] - sizes[:, :, None]) * 3
+    color = rows[..., 8:11]
+    tint = (color[:, None] - color[:, :, None]).norm(dim=-1, keepdim=True)
+    same = (rows[:, None, :, 0] == rows[:, :, None, 0]).float()[..., None]
+    return torch.cat([way, far, way[..., :2] / (far + 0.05), unlike, tint, same], dim=-1)
+
+
+RELATIONS = 11
+
+
+class Reader(nn.Module):
+    """Words to vectors that know their neighbours; attention of a control to them."""
+
+    def __init__(self, words: int, width: int) -> None:
+        super().__init__()
+        self.own = nn.Embedding(words, width)
+        nn.init.normal_(self.own.weight, std=0.3)
+        self.general = nn.Linear(MEANING, width, bias=False)
+        self.count = nn.Embedding(COUNTED, width)
+        self.last = nn.Embedding(len(TYPES) + 1, width)
+        self.mix = nn.ModuleList([nn.Conv1d(width, width, 5, padding=2) for _ in range(2)])
+        self.norm = nn.LayerNorm(width)
+
+    def forward(self, batch: Batch) -> tuple[Tensor, Tensor]:
+        """(B, L + 2, C) and which of them are there; the last two tell of what was done."""
+        there = (batch.words != EMPTY).float()[..., None]
+        x = (self.own(batch.words) + 4 * self.general(batch.meanings)) * there
+        for mix in self.mix:
+            x = (x + F.relu(mix(x.transpose(1, 2)).transpose(1, 2))) * there
+        done = self.count(batch.last[:, 0].clamp(max=COUNTED - 1))
+        last = self.last(batch.last[:, 1] + 1)
+        every = torch.cat([self.norm(x), done[:, None], last[:, None]], dim=1)
+        return every, torch.cat([batch.words != EMPTY, torch.ones_like(batch.last) > 0], dim=1)
+
+
+class Layer(nn.Module):
+    """One reading of the words, one comparison of the objects."""
+
+    def __init__(self, width: int, pair: int) -> None:
+        super().__init__()
+        self.width = width
+        self.start = nn.Parameter(torch.randn(width) * 0.3)
+        self.query = nn.Linear(2 * width, width)
+        self.known = nn.Linear(width, 2 * width)
+        self.film = nn.Linear(width, 2 * width)
+        self.before = nn.LayerNorm(width)
+        self.here, self.there = nn.Linear(width, pair), nn.Linear(width, pair)
+        self.between, self.told = nn.Linear(RELATIONS, pair), nn.Linear(width, 2 * pair)
+        self.gate = nn.Linear(pair, pair)
+        self.joined = nn.Linear(pair + width, width)
+        self.alone = nn.Sequential(
+            nn.Linear(width, 2 * width), nn.ReLU(), nn.Linear(2 * width, width)
+        )
+
+    def control(self, words: Tensor, said: Tensor, before: Tensor, pooled: Tensor) -> Tensor:
+        """(B, C): what this layer reads."""
+        query = self.query(torch.cat([before, pooled], dim=1)) + self.start
+        key, value = self.known(words).unflatten(2, (HEADS, -1)).chunk(2, dim=3)
+        like = (key * query.unflatten(1, (HEADS, -1))[:, None]).sum(dim=3) / math.sqrt(
+            self.width / HEADS
+        )
+        like = like.masked_fill(~said[..., None], LOW).softmax(dim=1)
+        read: Tensor = (like[..., None] * value).sum(dim=1).flatten(1)
+        return read
+
+    def forward(self, x: Tensor, relations: Tensor, real: Tensor, control: Tensor) -> Tensor:
+        """(B, N, C), of the same shape."""
+        scale, shift = self.film(control)[:, None].chunk(2, dim=2)
+        here = F.relu(self.before(x) * (1 + scale) + shift)
+        more, less = self.told(control)[:, None, None].chunk(2, dim=3)
+        pair = self.between(relations) * (1 + more) + less
+        pair = F.relu(pair + self.here(here)[:, :, None] + self.there(here)[:, None])
+        pair = pair * torch.sigmoid(self.gate(pair)) * real[:, None, :, None]
+        x = x + self.joined(torch.cat([pair.sum(dim=2) / 4, here], dim=2))
+        out: Tensor = x + self.alone(x)
+        return out
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Logits: `type` (B, TYPES), `object` (B, N), `hops` (B, LAYERS - 1, N), and `features` for
+    the rest."""
+
+    type: Tensor
+    object: Tensor
+    hops: Tensor
+    features: tuple[Tensor, Tensor, Tensor]
+
+
+class PointNetwork(nn.Module):
+    """See the module's text."""
+
+    def __init__(self, words: int, width: int = 96, pair: int = 32) -> None:
+        super().__init__()
+        self.words = Reader(words, width)
+        self.kind = nn.Embedding(len(KINDS), 32)
+        inner = 2 * (FEATURES + 32) + TOKEN_WIDTH - 2 * SEEN_WIDTH
+        self.first = nn.Sequential(
+            nn.Linear(inner, 2 * width), nn.ReLU(), nn.Linear(2 * width, width)
+        )
+        self.layers = nn.ModuleList([Layer(width, pair) for _ in range(LAYERS)])
+        self.hop = nn.ModuleList([nn.Linear(width, width) for _ in range(LAYERS - 1)])
+        self.hopped = nn.ModuleList(
+            [nn.Linear(RELATIONS + width + 1, width) for _ in range(LAYERS - 1)]
+        )
+        self.control = nn.Linear(width, width)
+        self.deed = nn.Sequential(
+            nn.Linear(3 * width, width), nn.ReLU(), nn.Linear(width, len(TYPES))
+        )
+        self.object = _score(2 * width + len(TYPES), width)
+        self.goal = _score(3 * width + len(TYPES) + RELATIONS, width)
+        self.none = _score(2 * width + len(TYPES), width)
+        self.place = nn.Sequential(
+            nn.Linear(3 * width + FEATURES, 2 * width), nn.ReLU(), nn.Linear(2 * width, 64)
+        )
+        self.cells = nn.Sequential(nn.Linear(26, 64), nn.ReLU(), nn.Linear(64, 64))
+        self.register_buffer("grid", _waves(), persistent=False)
+
+    def forward(self, batch: Batch) -> Answer:
+        """What is done, and with which object."""
+        between = relations(batch.tokens)
+        words, said = self.words(batch)
+        x, real = self.first(self._inputs(batch.tokens)), batch.real.float()
+        control = words[:, -2] + words[:, -1]
+        hops = []
+        for i, layer in enumerate(self.layers):
+            pooled = (x * real[..., None]).sum(dim=1) / real.sum(dim=1, keepdim=True).clamp(min=1)
+            control = layer.control(words, said, control, pooled)
+            x = layer(x, between, real, control)
+            if i < LAYERS - 1:
+                like = (x * self.hop[i](control)[:, None]).sum(dim=2) / math.sqrt(x.shape[2])
+                like = like.masked_fill(~batch.real, LOW)
+                share = like.softmax(dim=1)
+                way = torch.einsum("bi,bijr->bjr", share, between)
+                there = torch.einsum("bi,bic->bc", share, x)[:, None].expand_as(x)
+                x = x + self.hopped[i](torch.cat([way, there, share[..., None]], dim=2))
+                hops.append(like)
+        pooled = x.masked_fill(~batch.real[..., None], LOW).amax(dim=1).clamp(min=-20)
+        mean = (x * real[..., None]).sum(dim=1) / real.sum(dim=1, keepdim=True).clamp(min=1)
+        kinds = self.deed(torch.cat([control, pooled, mean], dim=1))
+        liked = self._object(x, control, kinds).masked_fill(~batch.real, LOW)
+        return Answer(kinds, liked, torch.stack(hops, dim=1), (x, control, between))
+
+    def _inputs(self, tokens: Tensor) -> Tensor:
+        parts = []
+        for begin in (0, SEEN_WIDTH):
+            rows = tokens[..., begin : begin + SEEN_WIDTH]
+            there = (rows[..., 4:5] > 0).float()
+            parts += [seen_features(rows), self.kind(rows[..., 0].long()) * there]
+        return torch.cat([*parts, tokens[..., 2 * SEEN_WIDTH :]], dim=-1)
+
+    def _object(self, x: Tensor, control: Tensor, kinds: Tensor) -> Tensor:
+        told = torch.cat([control, kinds.detach().softmax(dim=1)], dim=1)
+        told = told[:, None].expand(-1, x.shape[1], -1)
+        liked: Tensor = self.object(torch.cat([x, told], dim=2))[..., 0]
+        return liked
+
+    def goal_of(self, answer: Answer, batch: Batch, kind: Tensor, chosen: Tensor) -> Tensor:
+        """(B, N + 1): liking of each destination, and of none, when the step is of this kind (B,)
+        and its object that (B,)."""
+        x, control, between = answer.features
+        rows = torch.arange(len(x))
+        mine, way = x[rows, chosen], between[rows, chosen]
+        told = torch.cat([control, F.one_hot(kind, len(TYPES)).float()], dim=1)
+        every = torch.cat([told, mine], dim=1)[:, None].expand(-1, x.shape[1], -1)
+        liked = self.goal(torch.cat([x, every, way], dim=2))[..., 0]
+        liked = liked.masked_fill(~batch.real, LOW).scatter(1, chosen[:, None], LOW)
+        return torch.cat([liked, self.none(torch.cat([told, mine], dim=1))], dim=1)
+
+    def heat_of(self, answer: Answer, batch: Batch, chosen: Tensor) -> Tensor:
+        """(B, cells): liking of each cell when the object is that (B,)."""
+        x, control, _ = answer.features
+        rows = torch.arange(len(x))
+        mean = (x * batch.real[..., None]).sum(dim=1) / batch.real.sum(dim=1, keepdim=True)
+        now = seen_features(batch.tokens[rows, chosen, :SEEN_WIDTH])
+        query = self.place(torch.cat([control, x[rows, chosen], mean, now], dim=1))
+        heat: Tensor = query @ self.cells(self.grid).T
+        return heat
+
+
+def _score(inner: int, width: int) -> nn.Sequential:
+    return nn.Sequential(nn.Linear(inner, width), nn.ReLU(), nn.Linear(width, 1))
+
+
+def cell_places() -> NDArray[np.float32]:
+    """(cells, 2): x and y [m] of the middles of the heat map's cells, x running fastest."""
+    xs, ys = (ORIGIN[i] + CELL * (np.arange(GRID[i]) + 0.5) for i in (0, 1))
+    return np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2).astype(np.float32)
+
+
+def _waves() -> Tensor:
+    places = torch.from_numpy(cell_places()) / 0.8
+    turns = places[:, :, None] * (2 * math.pi * 0.5 * 2.0 ** torch.arange(6) / 1.0)
+    return torch.cat([places, turns.sin().flatten(1), turns.cos().flatten(1)], dim=1)
+
+
+def batch_of(
+    tokens: Sequence[NDArray[np.float32]],
+    words: NDArray[np.int64],
+    meanings: NDArray[np.float32],
+    last: NDArray[np.int64],
+) -> Batch:
+    """States of different numbers of objects, side by side."""
+    most = max(1, *(len(t) for t in tokens))
+    rows = np.zeros((len(tokens), most, TOKEN_WIDTH), np.float32)
+    real = np.zeros((len(tokens), most), np.bool_)
+    for i, item in enumerate(tokens):
+        rows[i, : len(item)], real[i, : len(item)] = item, True
+    longest = max(1, int((words != EMPTY).sum(axis=1).max()))
+    said = (words[:, :longest], meanings[:, :longest])
+    parts = (torch.from_numpy(part) for part in (rows, real, *said, last))
+    return Batch(*parts)
+
+
+class Pointer:
+    """Decides the next step."""
+
+    def __init__(self, network: PointNetwork, vocabulary: Vocabulary) -> None:
+        self._network, self._vocabulary = network, vocabulary
+
+    def next_step(self, state: State, sentence: str) -> Step:
+        """What is most liked: a type, then an object for it, then where to."""
+        if not state.objects:
+            return Step("done")
+        last = TYPES.index(state.done[-1].type) if state.done else NOTHING
+        batch = batch_of(
+            [tokens_of(state)],
+            self._vocabulary.numbers(sentence)[None],
+            self._vocabulary.meanings(sentence)[None],
+            np.array([[len(state.done), last]], np.int64),
+        )
+        with torch.inference_mode():
+            told = self._network(batch)
+            kind, chosen = told.type.argmax(dim=1), told.object.argmax(dim=1)
+            name, number = TYPES[int(kind)], int(chosen)
+            if name in ("wait", "done"):
+                return Step(name)
+            if name not in WITH_GOAL:
+                return Step(name, number)
+            liked = self._network.goal_of(told, batch, kind, chosen)[0]
+            goal = int((liked if name == "move" else liked[:-1]).argmax())
+            if goal < len(state.objects):
+                return Step(name, number, goal)
+            x, y = cell_places()[int(self._network.heat_of(told, batch, chosen).argmax())].tolist()
+            return Step(name, number, None, (x, y))
+
+
+def load(folder: Path) -> Pointer:
+    """The pointer whose weights lie in `folder`."""
+    vocabulary = Vocabulary(json.loads((folder / "words.json").read_text()))
+    network = PointNetwork(FIRST_WORD + len(vocabulary.words))
+    load_weights(network, folder / "point.npz")
+    return Pointer(network, vocabulary)
