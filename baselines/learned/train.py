@@ -14,7 +14,7 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, wait
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Annotated
@@ -153,16 +153,20 @@ class States:
         ]
         tokens = [item.tokens[i] for item, i in zip(lessons, which, strict=True)]
         last = np.stack([item.last[i] for item, i in zip(lessons, which, strict=True)])
-        batch = batch_of(
-            [misseen(rng, t) for t in tokens], misheard(rng, np.stack(words)), last.astype(np.int64)
-        )
+        said = np.stack(words)
+        known = misheard(rng, said, [0.0, 0.1, 0.4])
+        meanings = self._vocabulary.table[misheard(rng, said, [0.0, 0.0, 0.1])]
+        seen = [misseen(rng, t) for t in tokens]
+        batch = batch_of(seen, known, meanings, last.astype(np.int64))
         answers = np.stack([item.answers[i] for item, i in zip(lessons, which, strict=True)])
         return batch, torch.from_numpy(answers)
 
 
-def misheard(rng: np.random.Generator, words: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Sentences (B, L), some with words that are not known."""
-    share = rng.choice([0.0, 0.05, 0.15], size=(len(words), 1))
+def misheard(
+    rng: np.random.Generator, words: NDArray[np.int64], shares: Sequence[float]
+) -> NDArray[np.int64]:
+    """Sentences (B, L), some with one of these shares of words that are not known."""
+    share = rng.choice(shares, size=(len(words), 1))
     return np.where((words >= FIRST_WORD) & (rng.random(words.shape) < share), UNKNOWN, words)
 
 
@@ -200,9 +204,7 @@ def point_losses(network: PointNetwork, batch: Batch, answers: Tensor) -> dict[s
     losses["goal"] = _cross(liked, nowhere, acts)
     placed = ~answers[:, 3].isnan()
     if placed.any():
-        some = Batch(
-            *(part[placed] for part in (batch.tokens, batch.real, batch.words, batch.last))
-        )
+        some = Batch(*(getattr(batch, field.name)[placed] for field in fields(Batch)))
         parts = told.features
         few = type(told)(
             told.type,
