@@ -177,21 +177,17 @@ def find_losses(
     with torch.autocast("cpu", torch.bfloat16, quick):
         told = network(inputs)
     told = told.float()
-    right = np.zeros(told.shape, np.float32)
-    near = np.zeros((len(images), *told.shape[2:]), np.bool_)
     rows, columns = told.shape[2:]
+    cells = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=2) + 0.5
+    right, near = np.zeros(told.shape, np.float32), np.zeros((len(images), 1, rows, columns))
     for i, items in enumerate(seen):
-        u, v = (pixel / CELL for pixel in middle_pixel(items))
-        order = np.argsort(-items[:, 2])  # what is nearer to the camera comes last and counts
-        for a, b in ((u[k], v[k]) for k in order):
-            row, column = int(b), int(a)
-            right[i, 0, row, column] = 1
-            for r in range(max(0, row - 1), min(rows, row + 2)):
-                for c in range(max(0, column - 1), min(columns, column + 2)):
-                    if (r, c) == (row, column) or not right[i, 0, r, c]:
-                        right[i, 1:, r, c], near[i, r, c] = (a - c - 0.5, b - r - 0.5), True
-    target = torch.from_numpy(right)
-    mask = torch.from_numpy(near)[:, None]
+        ways = np.stack(middle_pixel(items), axis=1) / CELL - cells[:, :, None]
+        far = np.abs(ways).max(axis=3)
+        nearest = far.argmin(axis=2)[..., None]
+        way = np.take_along_axis(ways, nearest[..., None], axis=2)[:, :, 0]
+        far = np.take_along_axis(far, nearest, axis=2)[..., 0]
+        right[i, 0], right[i, 1:], near[i, 0] = far <= 0.5, way.transpose(2, 0, 1), far < 1.5
+    target, mask = torch.from_numpy(right), torch.from_numpy(near).float()
     count = target[:, 0].sum().clamp(min=1)
     found = F.binary_cross_entropy_with_logits(told[:, 0], target[:, 0], reduction="sum") / count
     away = (F.smooth_l1_loss(told[:, 1:], target[:, 1:], reduction="none", beta=0.1) * mask).sum()

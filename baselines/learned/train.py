@@ -14,7 +14,7 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, wait
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Annotated
@@ -106,10 +106,8 @@ class Training:
             self._optimizer.step()
             self._schedule.step()
             self.done += 1
-            for name, value in parts.items():
-                self.shown[name] = 0.98 * self.shown.get(
-                    name, float(value.detach())
-                ) + 0.02 * float(value.detach())
+            for name, value in ((name, float(part.detach())) for name, part in parts.items()):
+                self.shown[name] = 0.98 * self.shown.get(name, value) + 0.02 * value
             if self.done % EVERY == 0 or self.done == self._steps:
                 self._keep()
                 rate = (self.done - begun) / (time.monotonic() - start)
@@ -136,30 +134,23 @@ class States:
     def __init__(self, lessons: Sequence[Lesson], vocabulary: Vocabulary) -> None:
         self._lessons, self._vocabulary = lessons, vocabulary
         count = np.bincount([item.variant for item in lessons], minlength=len(scenes.variants()))
-        weight = np.array([1 / count[item.variant] for item in lessons])
-        states = np.array([len(item.tokens) for item in lessons])
-        weight *= np.where(states > 1, 2.0, 1.0)
+        weight = np.array([min(2, len(o.tokens)) / count[o.variant] for o in lessons])
         self._reached = np.cumsum(weight / weight.sum())
         self._told = [np.stack([vocabulary.numbers(s) for s in item.told]) for item in lessons]
 
     def draw(self, rng: np.random.Generator, count: int) -> tuple[Batch, Tensor]:
         """`count` states, seen and told a little wrongly, and their answers (B, 6)."""
-        chosen = np.searchsorted(self._reached, rng.random(count))
-        lessons = [self._lessons[min(int(i), len(self._lessons) - 1)] for i in chosen]
-        which = [int(rng.integers(len(item.tokens))) for item in lessons]
-        words = [
-            told[int(rng.integers(len(told)))]
-            for told in (self._told[min(int(i), len(self._told) - 1)] for i in chosen)
+        chosen = np.searchsorted(self._reached[:-1], rng.random(count))
+        pairs = [
+            (self._lessons[i], int(rng.integers(len(self._lessons[i].tokens)))) for i in chosen
         ]
-        tokens = [item.tokens[i] for item, i in zip(lessons, which, strict=True)]
-        last = np.stack([item.last[i] for item, i in zip(lessons, which, strict=True)])
-        said = np.stack(words)
+        said = np.stack([self._told[i][rng.integers(len(self._told[i]))] for i in chosen])
+        last = np.stack([item.last[i] for item, i in pairs])
         known = misheard(rng, said, [0.0, 0.1, 0.4])
         meanings = self._vocabulary.table[misheard(rng, said, [0.0, 0.0, 0.1])]
-        seen = [misseen(rng, t) for t in tokens]
+        seen = [misseen(rng, item.tokens[i]) for item, i in pairs]
         batch = batch_of(seen, known, meanings, last.astype(np.int64))
-        answers = np.stack([item.answers[i] for item, i in zip(lessons, which, strict=True)])
-        return batch, torch.from_numpy(answers)
+        return batch, torch.from_numpy(np.stack([item.answers[i] for item, i in pairs]))
 
 
 def misheard(
@@ -202,22 +193,9 @@ def point_losses(network: PointNetwork, batch: Batch, answers: Tensor) -> dict[s
     liked = network.goal_of(told, batch, kind, chosen.clamp(min=0))
     nowhere = torch.where(goal == NOTHING, liked.shape[1] - 1, goal)
     losses["goal"] = _cross(liked, nowhere, acts)
-    placed = ~answers[:, 3].isnan()
-    if placed.any():
-        some = Batch(*(getattr(batch, field.name)[placed] for field in fields(Batch)))
-        parts = told.features
-        few = type(told)(
-            told.type,
-            told.object,
-            told.hops,
-            (parts[0][placed], parts[1][placed], parts[2][placed]),
-        )
-        heat = network.heat_of(few, some, chosen[placed])
-        losses["place"] = (
-            0.3
-            * (-(heat.log_softmax(dim=1) * near(answers[placed, 3:5])).sum(dim=1)).sum()
-            / len(answers)
-        )
+    heat = network.heat_of(told, batch, chosen.clamp(min=0)).log_softmax(dim=1)
+    away = -(heat * near(answers[:, 3:5].nan_to_num())).sum(dim=1)
+    losses["place"] = 0.3 * (away * ~answers[:, 3].isnan()).mean()
     hops = [_cross(told.hops[:, i], refers, refers != NOTHING) for i in range(told.hops.shape[1])]
     losses["reference"] = 0.3 * sum(hops, torch.zeros(()))
     return losses
@@ -272,10 +250,9 @@ def _point(out: Path, options: TrainOptions) -> None:
 def _perceive(out: Path, name: str, options: TrainOptions) -> None:
     shown = Pictures(_make(out, "pictures", range(options.pictures)))
     torch.manual_seed(options.seed)
-    finds = name == "find"
-    network = FindNetwork() if finds else MeasureNetwork()
+    network = FindNetwork() if name == "find" else MeasureNetwork()
     network.to(memory_format=torch.channels_last)
-    total = options.find if finds else options.measure
+    total = options.find if name == "find" else options.measure
 
     def losses(step: int) -> dict[str, Tensor]:
         rng = np.random.default_rng([options.seed, step])
