@@ -36,6 +36,8 @@ AROUND = 48
 BLOCK = KINDS.index("block")
 NUMBERS = 16
 """Of a measurement: place 3, half sizes 3, turn 6, colour 3, hinge 1."""
+SQUARE = 1.08
+"""How much longer than wide what is about square may seem."""
 NEAR, UNIT = 0.03, 0.02
 """The height above the table [m] in which a pixel is looked up, and the unit of offsets [m]."""
 
@@ -153,13 +155,13 @@ def seen_of(numbers: NDArray[np.float64], pixels: NDArray[np.float64]) -> list[S
         a, b, c = (float(h) for h in 0.03 * np.exp(row[3:6]))
         turns = [math.atan2(row[7 + 2 * i], row[6 + 2 * i]) / k for i, k in enumerate((1, 2, 4))]
         sure = [math.hypot(row[6 + 2 * i], row[7 + 2 * i]) > 0.6 for i in range(3)]
-        turn = next((t for t, s in zip(turns, sure, strict=True) if s), turns[0])
-        red, green, blue = (min(1.0, max(0.0, float(value))) for value in row[12:15])
         kind = KINDS[int(row[NUMBERS:].argmax())]
-        place = (float(x), float(y), float(TABLE_TOP + UNIT * row[2]))
-        found.append(
-            Seen(kind, place, (a, b, c), turn, (red, green, blue), max(0.0, float(row[15])))
-        )
+        turn = next((t for t, s in zip(turns, sure, strict=True) if s), turns[0])
+        if kind == "block":  # half turns of a bar, and quarter turns of a cube, look alike
+            turn = turns[2] if a < SQUARE * b else turns[1]
+        red, green, blue = (float(value) for value in row[12:15].clip(0, 1))
+        place, hinge = (float(x), float(y), float(TABLE_TOP + UNIT * row[2])), max(0.0, row[15])
+        found.append(Seen(kind, place, (a, b, c), turn, (red, green, blue), float(hinge)))
     return found
 
 
