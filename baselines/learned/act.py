@@ -83,8 +83,9 @@ def objects_of(row: Rows) -> list[Seen]:
     return found
 
 
-NEEDS = {"hang": ("handle", "hang"), "hit": ("head", "press"), "pour": ("support", "support")}
+NEEDS = {"hang": ("handle", "hang"), "hit": ("head", "press")}
 """The frames that object and destination of a step of a type must have."""
+ONTO = {"dock": calls.Dock, "hang": calls.Hang, "pour": calls.Pour}
 ALONE = ("pick", "press", "open", "lift", "back", "move")
 """Types of steps that need no destination."""
 
@@ -123,15 +124,10 @@ def calls_of(steps: Sequence[Step], state: State) -> list[object]:
             ]
         case "stamp":
             return [calls.Stamp(name, on, count)]
-        case "dock":
-            return [calls.Dock(name, on)]
-        case "hang":
-            return [calls.Hang(name, on)]
+        case "dock" | "hang" | "pour":
+            return [ONTO[step.type](name, on)]
         case "hit":
-            targets = tuple(str(s.destination) for s in steps)
-            return [calls.Hit(name, targets)]
-        case "pour":
-            return [calls.Pour(name, on)]
+            return [calls.Hit(name, tuple(str(s.destination) for s in steps))]
         case "open":
             return [calls.Open(name)]
         case "lift":
@@ -160,7 +156,8 @@ def _moved(step: Step, state: State) -> list[object]:
         return [calls.Pick(name, RISE), calls.Place(name, (x, y, z + low))]
     if step.type == "turn" and step.destination is not None:
         x, y, z = item.first.place
-        goal = _quarter(state.objects[step.destination].first.turn)
+        quarters = round(state.objects[step.destination].first.turn / (math.pi / 2))
+        goal = quarters * math.pi / 2
         half = math.cos(goal - item.now.turn) < -0.7 and abs(x) < TURN_AT_ONCE
         ways = [goal - math.pi / 2, goal] if half else [goal]
         return [
@@ -181,11 +178,6 @@ def _moved(step: Step, state: State) -> list[object]:
     place = free_place(state, step.object, step.place)
     z = support_height(state.objects, place, item.now)
     return [calls.Pick(name, LIFT), calls.Place(name, (*place, z + low))]
-
-
-def _quarter(turn: float) -> float:
-    """The nearest quarter turn [rad]."""
-    return round(turn / (math.pi / 2)) * math.pi / 2
 
 
 def free_place(
@@ -286,8 +278,8 @@ class Belief:
                 old, new = float(before[c.gripper]), float(row[c.gripper])
                 if self.held[arm] is None and new < SHUT < old and target is not None:
                     self._close(arm, row, target)
-                elif self.held[arm] is not None and new > old + 0.02:
-                    self._carry(arm, row)
+                elif (hold := self.held[arm]) is not None and new > old + 0.02:
+                    self._put(hold.number, self._end(arm, row) * hold.offset)
                     self.held[arm] = None
             before = row
         self.last = before
@@ -312,11 +304,6 @@ class Belief:
 
     def _end(self, arm: int, row: Rows) -> Pose:
         return end_effector(self.chains[arm], row[self.columns[arm].body].astype(float).tolist())
-
-    def _carry(self, arm: int, row: Rows) -> None:
-        hold = self.held[arm]
-        if hold is not None:
-            self._put(hold.number, self._end(arm, row) * hold.offset)
 
     def _close(self, arm: int, row: Rows, target: int) -> None:
         """Hold the object if the fingers are about it, in their middle."""
@@ -381,16 +368,13 @@ class Belief:
         for i in set(range(len(items))) - old:
             items[i] = replace(items[i], visible=False)
         for k in set(range(len(seen))) - new:
-            if not any(self._is_held(one, seen[k]) for one in inside):
+            if not any(items[i].now.kind == seen[k].kind for i in inside):
                 items.append(Tracked(seen[k], seen[k], at_start=False))
                 self.poses.append(pose_of(seen[k]))
         state = replace(self.state, objects=tuple(items))
         pairs_seen = zip(items, hidden(state).objects, strict=True)
         objects = tuple(replace(o, visible=o.visible and h.visible) for o, h in pairs_seen)
         self.state = replace(state, objects=objects)
-
-    def _is_held(self, number: int, one: Seen) -> bool:
-        return one.kind == self.state.objects[number].now.kind
 
 
 def _unlike(item: Tracked, one: Seen) -> float:

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from robospa.baselines.learned.act import Belief, Rows, calls_of, objects_of, possible
-from robospa.baselines.learned.steps import Seen, State, Step, Tracked, after
+from robospa.baselines.learned.steps import Seen, State, Step, after
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.skills.expert import Expert
@@ -129,13 +129,12 @@ class Learned:
         if failed and self._tries < TRIES:
             return
         self._tries = 0
-        items = list(belief.state.objects)
+        counted = belief.state
         for step in self._steps:
-            if step.object is not None:
-                items[step.object] = _counted(items[step.object], 1, 0)
-            if step.destination is not None:
-                items[step.destination] = _counted(items[step.destination], 0, 1)
-        belief.state = State(tuple(items), (*belief.state.done, *self._steps))
+            counted = after(counted, step)
+        pairs = zip(belief.state.objects, counted.objects, strict=True)
+        items = (replace(now, acts=then.acts, goals=then.goals) for now, then in pairs)
+        belief.state = State(tuple(items), counted.done)
 
     def _missed(self, belief: Belief, step: Step) -> str:
         """What of the step did not come out; "" if all of it did."""
@@ -162,15 +161,8 @@ class Learned:
 
 def _alike(one: Step, other: Step) -> bool:
     """Whether both steps are done in one go."""
-    if one.type == "press":
-        return True
-    return one.object == other.object and (
-        one.type != "stamp" or one.destination == other.destination
-    )
-
-
-def _counted(item: Tracked, acts: int, goals: int) -> Tracked:
-    return replace(item, acts=item.acts + acts, goals=item.goals + goals)
+    same = one.type != "stamp" or one.destination == other.destination
+    return one.type == "press" or (one.object == other.object and same)
 
 
 WEIGHTS = Path(__file__).parent / "weights"
