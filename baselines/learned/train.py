@@ -48,6 +48,7 @@ from robospa.baselines.learned.scenes import NOTHING, SEEN_WIDTH, Lesson, Pictur
 from robospa.baselines.learned.steps import KINDS
 from robospa.harness.running.atomic_file import replace_file
 from robospa.protocol.options import option
+from robospa.tasks.catalog import tasks
 from robospa.tasks.scene import SUITE
 
 Count = Annotated[int, Meta(ge=1)]
@@ -128,13 +129,18 @@ class Training:
 # -- the next step ------------------------------------------------------------------------------
 
 
+OFTEN = {"spatial": 3.0, "procedural": 2.0, "basic": 0.5}
+
+
 class States:
-    """The states of all lessons, drawn at random: each variant equally often."""
+    """The states of all lessons, drawn at random: those of a spatial variant half as often again as
+    those of a procedural one, which are easier, and of a basic one less."""
 
     def __init__(self, lessons: Sequence[Lesson], vocabulary: Vocabulary) -> None:
         self._lessons, self._vocabulary = lessons, vocabulary
         count = np.bincount([item.variant for item in lessons], minlength=len(scenes.variants()))
-        weight = np.array([min(2, len(o.tokens)) / count[o.variant] for o in lessons])
+        kinds = [tasks()[name].dimension for name, _ in scenes.variants()]
+        weight = np.array([OFTEN[kinds[o.variant]] / count[o.variant] for o in lessons])
         self._reached = np.cumsum(weight / weight.sum())
         self._told = [np.stack([vocabulary.numbers(s) for s in item.told]) for item in lessons]
 
