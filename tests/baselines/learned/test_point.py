@@ -1,0 +1,72 @@
+"""Words and objects to the next step: order never matters, unknown words mean something."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from robospa.baselines.learned import point  # noqa: E402
+from robospa.baselines.learned.perceive import save_weights  # noqa: E402
+from robospa.baselines.learned.scenes import lesson  # noqa: E402
+from robospa.baselines.learned.steps import State, Step, labelled  # noqa: E402
+from robospa.baselines.learned.train import States, point_losses  # noqa: E402
+from robospa.tasks.catalog import build_scene  # noqa: E402
+
+SCENE = build_scene("Stack_Blocks_Color_Order", 3, 1_500_000)
+WORDS = ("stack", "the", "red", "block", "left")
+
+
+@pytest.fixture
+def pointer(tmp_path: Path) -> point.Pointer:
+    torch.manual_seed(0)
+    (tmp_path / "words.json").write_text(json.dumps(WORDS))
+    save_weights(point.PointNetwork(point.FIRST_WORD + len(WORDS)), tmp_path / "point.npz")
+    return point.load(tmp_path)
+
+
+def test_unknown_words_are_near_those_that_mean_the_same() -> None:
+    def alike(one: str, other: str) -> float:
+        return float(point.meaning(one) @ point.meaning(other))
+
+    assert alike("leftmost", "left") > 0.7 > 0.4 > alike("leftmost", "right")
+    assert alike("biggest", "largest") > 0.6 > alike("biggest", "stapler")
+    vocabulary = point.Vocabulary(WORDS)
+    assert vocabulary.numbers("Stack 2nd")[:4].tolist() == [2, point.UNKNOWN, point.UNKNOWN, 0]
+    np.testing.assert_array_equal(vocabulary.table[2], vocabulary.meanings("stack")[0])
+
+
+def test_the_order_of_objects_means_nothing(pointer: point.Pointer) -> None:
+    for state, _ in labelled(SCENE):
+        step = pointer.next_step(state, "stack the red block")
+        turned = State(tuple(reversed(state.objects)))
+        other = pointer.next_step(replace(turned, done=()), "stack the red block")
+        if not state.done and step.object is not None:
+            assert other == replace(
+                step,
+                object=len(state.objects) - 1 - step.object,
+                destination=None
+                if step.destination is None
+                else len(state.objects) - 1 - step.destination,
+            )
+    assert pointer.next_step(State(()), "stack") == Step("done")
+
+
+def test_a_loss_falls() -> None:
+    states = States([lesson(SCENE)], point.Vocabulary(WORDS))
+    network = point.PointNetwork(point.FIRST_WORD + len(WORDS))
+    optimizer = torch.optim.Adam(network.parameters(), 3e-3)
+    seen = []
+    for _ in range(20):
+        batch, answers = states.draw(np.random.default_rng(0), 8)
+        loss = sum(point_losses(network, batch, answers).values(), torch.zeros(()))
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+        seen.append(float(loss.detach()))
+    assert seen[-1] < 0.7 * seen[0]
