@@ -196,7 +196,6 @@ def picture(scene: Scene, state: State) -> Picture:
     items = [o for o in scene.objects if o.appears_at is None]
     items += [o for o in scene.objects if o.appears_at is not None]
     now = [o.now for o in state.objects]
-    rise = scene.table_rise
     poses = {o.name: _pose(model_of(o).bottom, s) for o, s in zip(items, now, strict=False)}
     hinges = {o.name: s.hinge for o, s in zip(items, now, strict=False) if s.hinge}
     poses |= {o.name: o.pose for o in scene.clutter}
@@ -207,7 +206,6 @@ def picture(scene: Scene, state: State) -> Picture:
         steps.seen_at(o.asset, model_of(o), o.pose) for o in scene.clutter if o.asset in KINDS
     ]
     rows = np.array([seen_numbers(s) for s in shown], np.float32).reshape(-1, SEEN_WIDTH)
-    rows[:, 3] -= rise
     return Picture(image, rows[in_picture(rows)])
 
 
