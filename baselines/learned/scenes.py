@@ -8,8 +8,6 @@ that a making that was cut short goes on where it was.
 
 from __future__ import annotations
 
-import json
-import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -128,42 +126,6 @@ def scenes(block: int, first: int = FIRST_TRAINING_SEED, mode: str = "clean") ->
             except LayoutError:
                 continue
             break
-
-
-# -- lessons on disk ----------------------------------------------------------------------------
-
-
-def save_lessons(path: Path, lessons: Sequence[Lesson]) -> None:
-    """Write lessons to one file, all at once or not at all."""
-    tokens = [t for item in lessons for t in item.tokens]
-    told = zlib.compress(json.dumps([item.told for item in lessons]).encode())
-    stream = BytesIO()
-    np.savez_compressed(
-        stream,
-        tokens=np.concatenate(tokens),
-        sizes=np.array([len(t) for t in tokens], np.int16),
-        answers=np.concatenate([item.answers for item in lessons]),
-        last=np.concatenate([item.last for item in lessons]),
-        states=np.array([len(item.tokens) for item in lessons], np.int16),
-        variants=np.array([item.variant for item in lessons], np.int16),
-        told=np.frombuffer(told, np.uint8),
-    )
-    replace_file(path, stream.getvalue())
-
-
-def read_lessons(path: Path) -> list[Lesson]:
-    """What `save_lessons` wrote."""
-    with np.load(path) as kept:
-        parts = {name: kept[name] for name in kept.files}
-    tokens = np.split(parts["tokens"], np.cumsum(parts["sizes"])[:-1])
-    ends = np.cumsum(parts["states"])
-    told = json.loads(zlib.decompress(parts["told"].tobytes()))
-    return [
-        Lesson(tokens[a:b], parts["answers"][a:b], parts["last"][a:b], tuple(said), int(where))
-        for a, b, said, where in zip(
-            ends - parts["states"], ends, told, parts["variants"], strict=True
-        )
-    ]
 
 
 # -- pictures -----------------------------------------------------------------------------------
@@ -287,20 +249,12 @@ class Pictures:
         return np.asarray(Image.open(BytesIO(self._packed[index])))
 
 
-# -- making blocks ------------------------------------------------------------------------------
-
-
-def make(folder: Path, kind: str, blocks: Sequence[int], say: Callable[[str], None]) -> list[Path]:
-    """Make the `blocks` of "lessons" or "pictures" that are not in `folder` yet."""
+def make(folder: Path, blocks: Sequence[int], say: Callable[[str], None]) -> list[Path]:
+    """Make the `blocks` of pictures that are not in `folder` yet."""
     folder.mkdir(parents=True, exist_ok=True)
-    paths = []
-    for block in blocks:
-        path = folder / f"{kind}-{block:05}.npz"
+    paths = [folder / f"pictures-{block:05}.npz" for block in blocks]
+    for block, path in zip(blocks, paths, strict=True):
         if not path.exists():
-            if kind == "lessons":
-                save_lessons(path, [lesson(scene) for scene in scenes(block)])
-            else:
-                save_pictures(path, list(pictures(block)))
+            save_pictures(path, list(pictures(block)))
             say(f"{path.name} made")
-        paths.append(path)
     return paths

@@ -44,7 +44,7 @@ from robospa.baselines.learned.point import (
     cell_places,
     vocabulary_of,
 )
-from robospa.baselines.learned.scenes import NOTHING, SEEN_WIDTH, Lesson, Pictures
+from robospa.baselines.learned.scenes import NOTHING, SEEN_WIDTH, Lesson, Pictures, lesson
 from robospa.baselines.learned.steps import KINDS
 from robospa.harness.running.atomic_file import replace_file
 from robospa.protocol.options import option
@@ -232,13 +232,12 @@ def _lower() -> None:
     torch.set_num_threads(1)
 
 
-def _make(out: Path, kind: str, blocks: Sequence[int]) -> list[Path]:
-    return scenes.make(out / "made", kind, blocks, say)
+def _make(out: Path, blocks: Sequence[int]) -> list[Path]:
+    return scenes.make(out / "made", blocks, say)
 
 
 def _point(out: Path, options: TrainOptions) -> None:
-    paths = _make(out, "lessons", range(options.blocks))
-    lessons = [item for path in paths for item in scenes.read_lessons(path)]
+    lessons = [lesson(scene) for n in range(options.blocks) for scene in scenes.scenes(n)]
     vocabulary = Vocabulary(vocabulary_of(s for item in lessons for s in item.told))
     states = States(lessons, vocabulary)
     torch.manual_seed(options.seed)
@@ -254,7 +253,7 @@ def _point(out: Path, options: TrainOptions) -> None:
 
 
 def _perceive(out: Path, name: str, options: TrainOptions) -> None:
-    shown = Pictures(_make(out, "pictures", range(options.pictures)))
+    shown = Pictures(_make(out, range(options.pictures)))
     torch.manual_seed(options.seed)
     network = FindNetwork() if name == "find" else MeasureNetwork()
     network.to(memory_format=torch.channels_last)
@@ -283,9 +282,7 @@ def train(out: Path, options: TrainOptions | None = None) -> None:
     (out / "made").mkdir(parents=True, exist_ok=True)
     halves = [range(k, options.pictures, 2) for k in (0, 1)]
     with ProcessPoolExecutor(2, get_context("spawn"), _lower) as workers:
-        making = [workers.submit(_make, out, "pictures", half) for half in halves]
-        making.append(workers.submit(_make, out, "lessons", range(options.blocks)))
-        wait(making)
+        wait([workers.submit(_make, out, half) for half in halves])
         learning = [workers.submit(_perceive, out, name, options) for name in ("measure", "find")]
         learning.append(workers.submit(_point, out, options))
         for task in learning:

@@ -1,28 +1,18 @@
 """Lessons and pictures: made from training seeds, kept in files, the same each time."""
 
 from itertools import islice
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from robospa.baselines.learned import scenes, steps
-from robospa.baselines.learned.scenes import SEEN_WIDTH, lesson, read_lessons, save_lessons
+from robospa.baselines.learned.scenes import SEEN_WIDTH, lesson
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.seeds import FIRST_TRAINING_SEED, LAST_TRAINING_SEED
 from robospa.tasks.sentences import sentences
 
 STACK = build_scene("Stack_Blocks_Color_Order", 2, FIRST_TRAINING_SEED)
 FAR = build_scene("Pick_Mugs_Distance", 1, FIRST_TRAINING_SEED)
-
-
-def test_lessons_survive_their_file(tmp_path: Path) -> None:
-    made = [lesson(STACK), lesson(FAR)]
-    save_lessons(tmp_path / "lessons.npz", made)
-    for one, other in zip(made, read_lessons(tmp_path / "lessons.npz"), strict=True):
-        assert (one.told, one.variant) == (other.told, other.variant)
-        np.testing.assert_array_equal(one.answers, other.answers)
-        np.testing.assert_array_equal(np.concatenate(one.tokens), np.concatenate(other.tokens))
 
 
 def test_a_scene_is_told_by_its_training_sentences() -> None:
