@@ -29,8 +29,9 @@ from robospa.workcell import HEIGHT, TABLE_TOP, WIDTH, WORKCELL
 WEIGHTS = Path(__file__).parent / "weights"
 CELL = 8
 """Pixels along a side of the cells in which middles are looked for."""
-LIKELY, APART = 0.35, 6.0
-"""How probable a middle has to be, and how far [px] from a likelier one."""
+HARDLY, LIKELY, APART = 0.04, 0.35, 6.0
+"""How probable a cell has to be to count, and all cells of a middle together; middles are at least
+so far [px] from each other."""
 AROUND = 48
 """Pixels along a side of what is seen sharply; twice that is seen from farther away."""
 BLOCK = KINDS.index("block")
@@ -266,16 +267,21 @@ class Perceiver:
 
 
 def middles(told: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(K, 2): pixels of the middles that the finding network tells of (3, rows, columns)."""
+    """(K, 2): pixels of the middles that the finding network tells of (3, rows, columns), surest
+    first. Cells that mean the same middle are likely together."""
     likely = 1 / (1 + np.exp(-told[0]))
-    rows, columns = np.nonzero(likely > LIKELY)
+    rows, columns = np.nonzero(likely > HARDLY)
     order = np.argsort(-likely[rows, columns], kind="stable")
-    found: list[NDArray[np.float64]] = []
+    found, total = np.zeros((0, 2)), np.zeros(0)
     for row, column in zip(rows[order], columns[order], strict=True):
         at = (np.array([column, row]) + 0.5 + told[1:, row, column]) * CELL
-        if all(np.hypot(*(at - other)) > APART for other in found):
-            found.append(at)
-    return np.array(found).reshape(-1, 2)
+        same = np.flatnonzero(np.hypot(*(found - at).T) < APART)[:1]
+        if len(same):
+            total[same] += likely[row, column]
+        else:
+            found, total = np.vstack([found, at]), np.append(total, likely[row, column])
+    kept = np.argsort(-total, kind="stable")
+    return np.asarray(found[kept][total[kept] > LIKELY])
 
 
 def load(folder: Path | None = None) -> Perceiver:
