@@ -8,7 +8,7 @@ that a making that was cut short goes on where it was.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from io import BytesIO
@@ -25,6 +25,7 @@ from robospa.geometry import Pose, yaw_rotation
 from robospa.harness.robots import embodiment
 from robospa.harness.running.atomic_file import replace_file
 from robospa.observation import CameraSpec
+from robospa.protocol.codec import Limits, decode, encode
 from robospa.tasks.catalog import LEVELS, build_scene, tasks
 from robospa.tasks.objects import model_of, object_model
 from robospa.tasks.sampling.places import LayoutError
@@ -47,8 +48,8 @@ TOLD = 8
 """Sentences kept of a scene."""
 RANDOMISED = 4
 """Of so many pictures one shows a randomised scene."""
-FAR_UP = 0.05
-"""A thing so far [m] above where it stood is in a hand: such states are not drawn."""
+LARGE = Limits(message=2**30, items=10**7)
+"""Of a file of pictures."""
 UNDRAWN = ("dock", "hang", "pour", "hit", "pick")
 """After these steps a thing is tilted, or in a hand, as no `Seen` says."""
 
@@ -133,10 +134,17 @@ def scenes(block: int, first: int = FIRST_TRAINING_SEED, mode: str = "clean") ->
 
 @dataclass(frozen=True)
 class Picture:
-    """A head picture (H, W, 3) and the `seen` objects in it (N, SEEN_WIDTH)."""
+    """A head picture, packed without loss, and the `seen` objects in it (N, SEEN_WIDTH)."""
 
-    image: NDArray[np.uint8]
+    packed: bytes
     seen: Array
+
+    @property
+    def image(self) -> NDArray[np.uint8]:
+        """(H, W, 3)."""
+        from PIL import Image
+
+        return np.asarray(Image.open(BytesIO(self.packed)))
 
 
 @cache
@@ -154,6 +162,8 @@ def _renderer(robot: str) -> tuple[Renderer, list[dict[str, Pose]]]:
 
 def picture(scene: Scene, state: State) -> Picture:
     """What the head camera sees of a state of the scene's plan, arms at home."""
+    from PIL import Image
+
     renderer, links = _renderer(scene.embodiment)
     items = [o for o in scene.objects if o.appears_at is None]
     items += [o for o in scene.objects if o.appears_at is not None]
@@ -168,7 +178,9 @@ def picture(scene: Scene, state: State) -> Picture:
         steps.seen_at(o.asset, model_of(o), o.pose) for o in scene.clutter if o.asset in KINDS
     ]
     rows = np.array([seen_numbers(s) for s in shown], np.float32).reshape(-1, SEEN_WIDTH)
-    return Picture(image, rows[in_picture(rows)])
+    packed = BytesIO()
+    Image.fromarray(image).save(packed, "PNG", compress_level=1)
+    return Picture(packed.getvalue(), rows[in_picture(rows)])
 
 
 def _pose(bottom: float, seen: Seen) -> Pose:
@@ -205,56 +217,18 @@ def pictures(block: int, first: int = FIRST_TRAINING_SEED) -> Iterator[Picture]:
         yield picture(scene, states[int(rng.integers(1, len(states))) if later else 0])
 
 
-def save_pictures(path: Path, made: Sequence[Picture]) -> None:
-    """Write pictures, packed without loss, and what is seen in them to one file."""
-    from PIL import Image
-
-    packed = []
-    for item in made:
-        stream = BytesIO()
-        Image.fromarray(item.image).save(stream, "PNG", compress_level=1)
-        packed.append(stream.getvalue())
-    whole = BytesIO()
-    np.savez(
-        whole,
-        packed=np.frombuffer(b"".join(packed), np.uint8),
-        lengths=np.array([len(p) for p in packed], np.int64),
-        seen=np.concatenate([item.seen for item in made]),
-        sizes=np.array([len(item.seen) for item in made], np.int64),
-    )
-    replace_file(path, whole.getvalue())
-
-
-class Pictures:
-    """The pictures of several files, unpacked when they are asked for."""
-
-    def __init__(self, paths: Sequence[Path]) -> None:
-        self._packed: list[bytes] = []
-        self.seen: list[Array] = []
-        for path in paths:
-            with np.load(path) as kept:
-                data, ends = kept["packed"].tobytes(), np.cumsum(kept["lengths"])
-                starts = ends - kept["lengths"]
-                self._packed += [data[a:b] for a, b in zip(starts, ends, strict=True)]
-                self.seen += np.split(kept["seen"], np.cumsum(kept["sizes"])[:-1])
-
-    def __len__(self) -> int:
-        """How many there are."""
-        return len(self._packed)
-
-    def image(self, index: int) -> NDArray[np.uint8]:
-        """Picture number `index` (H, W, 3)."""
-        from PIL import Image
-
-        return np.asarray(Image.open(BytesIO(self._packed[index])))
+def read(paths: Iterable[Path]) -> list[Picture]:
+    """The pictures in files that `make` wrote."""
+    rows = [decode(path.read_bytes(), LARGE) for path in paths]
+    return [Picture(**item) for row in rows if isinstance(row, list) for item in row]
 
 
 def make(folder: Path, blocks: Sequence[int], say: Callable[[str], None]) -> list[Path]:
-    """Make the `blocks` of pictures that are not in `folder` yet."""
+    """The files of the `blocks` of pictures in `folder`; those that are not there yet are made."""
     folder.mkdir(parents=True, exist_ok=True)
-    paths = [folder / f"pictures-{block:05}.npz" for block in blocks]
+    paths = [folder / f"pictures-{block:05}" for block in blocks]
     for block, path in zip(blocks, paths, strict=True):
         if not path.exists():
-            save_pictures(path, list(pictures(block)))
+            replace_file(path, encode([vars(o) for o in pictures(block) if len(o.seen)], LARGE))
             say(f"{path.name} made")
     return paths

@@ -44,7 +44,7 @@ from robospa.baselines.learned.point import (
     cell_places,
     vocabulary_of,
 )
-from robospa.baselines.learned.scenes import NOTHING, SEEN_WIDTH, Lesson, Pictures, lesson
+from robospa.baselines.learned.scenes import NOTHING, SEEN_WIDTH, Lesson, lesson
 from robospa.baselines.learned.steps import KINDS
 from robospa.harness.running.atomic_file import replace_file
 from robospa.protocol.options import option
@@ -232,10 +232,6 @@ def _lower() -> None:
     torch.set_num_threads(1)
 
 
-def _make(out: Path, blocks: Sequence[int]) -> list[Path]:
-    return scenes.make(out / "made", blocks, say)
-
-
 def _point(out: Path, options: TrainOptions) -> None:
     lessons = [lesson(scene) for n in range(options.blocks) for scene in scenes.scenes(n)]
     vocabulary = Vocabulary(vocabulary_of(s for item in lessons for s in item.told))
@@ -253,7 +249,7 @@ def _point(out: Path, options: TrainOptions) -> None:
 
 
 def _perceive(out: Path, name: str, options: TrainOptions) -> None:
-    shown = Pictures(_make(out, range(options.pictures)))
+    shown = scenes.read(scenes.make(out / "made", range(options.pictures), say))
     torch.manual_seed(options.seed)
     network = FindNetwork() if name == "find" else MeasureNetwork()
     network.to(memory_format=torch.channels_last)
@@ -261,9 +257,8 @@ def _perceive(out: Path, name: str, options: TrainOptions) -> None:
 
     def losses(step: int) -> dict[str, Tensor]:
         rng = np.random.default_rng([options.seed, step])
-        chosen = [int(i) for i in rng.integers(len(shown), size=PICTURES)]
-        chosen = [i for i in chosen if len(shown.seen[i])]
-        images, seen = [shown.image(i) for i in chosen], [shown.seen[i] for i in chosen]
+        chosen = [shown[i] for i in rng.integers(len(shown), size=PICTURES)]
+        images, seen = [o.image for o in chosen], [o.seen for o in chosen]
         quick = step < QUICK * total
         if isinstance(network, FindNetwork):
             return find_losses(network, images, seen, quick)
@@ -279,10 +274,9 @@ def train(out: Path, options: TrainOptions | None = None) -> None:
     """
     options = options or TrainOptions()
     begun = time.monotonic()
-    (out / "made").mkdir(parents=True, exist_ok=True)
     halves = [range(k, options.pictures, 2) for k in (0, 1)]
     with ProcessPoolExecutor(2, get_context("spawn"), _lower) as workers:
-        wait([workers.submit(_make, out, half) for half in halves])
+        wait([workers.submit(scenes.make, out / "made", half, say) for half in halves])
         learning = [workers.submit(_perceive, out, name, options) for name in ("measure", "find")]
         learning.append(workers.submit(_point, out, options))
         for task in learning:

@@ -1,6 +1,7 @@
 """Lessons and pictures: made from training seeds, kept in files, the same each time."""
 
 from itertools import islice
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -50,3 +51,14 @@ def test_a_picture_shows_each_object_where_it_is_said_to_be() -> None:
     empty = shown.image[5, 160].astype(int)
     for u, v in zip(*scenes.middle_pixel(shown.seen), strict=True):
         assert np.abs(shown.image[int(v), int(u)].astype(int) - empty).max() > 20
+
+
+@pytest.mark.sim
+def test_pictures_made_once_are_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(scenes, "variants", lambda: (("Stack_Blocks_Color_Order", 2),))
+    said: list[str] = []
+    (first,) = scenes.read(scenes.make(tmp_path, [0], said.append))
+    (again,) = scenes.read(scenes.make(tmp_path, [0], said.append))
+    assert len(said) == 1
+    np.testing.assert_array_equal(first.image, again.image)
+    np.testing.assert_array_equal(first.seen, again.seen)
