@@ -67,11 +67,13 @@ LIFT, RISE = 0.08, 0.10
 """How high [m] things are lifted: to be set down again, and to go elsewhere."""
 
 
-def objects_of(row: Rows) -> list[Seen]:
-    """The objects in an environment state (E,): what a perfect eye would see."""
+def told(observation: Observation) -> list[Seen]:
+    """The objects of an environment state: what a perfect eye would see."""
     codes = {tuple(kind_code(kind)): kind for kind in KINDS}
     found = []
-    for numbers in row.reshape(SLOTS, len(FEATURES)).astype(float).tolist():
+    for numbers in (
+        observation["environment_state"].reshape(SLOTS, len(FEATURES)).astype(float).tolist()
+    ):
         of = dict(zip(FEATURES, numbers, strict=True))
         if of["present"]:
             kind = codes[tuple(numbers[-12:])]

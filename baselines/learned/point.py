@@ -1,4 +1,4 @@
-"""Which step comes next: objects now and as first seen, a sentence and the steps done in, a step out.
+"""Which step comes next: from objects now and as first seen, a sentence, and the steps done.
 
 Four layers in turn. Each attends to the words anew (its *control*), scales and shifts the objects
 by what it read (FiLM, Perez et al. 2018), and compares them two by two; between layers a soft
@@ -62,8 +62,8 @@ def vocabulary_of(sentences: Iterable[str], least: int = 1) -> tuple[str, ...]:
 
 @cache
 def _pieces() -> tuple[dict[str, int], NDArray[np.float32]]:
-    """Pieces of words, those that begin one with "\u2581", and a vector of MEANING for each: 128 main
-    components of the 256 numbers of wordllama (l2_supercat, MIT licence)."""
+    """Pieces of words, those that begin one with "\u2581", and the vector of each: the main
+    components of those of wordllama (l2_supercat, MIT licence)."""
     with np.load(PIECES) as kept:
         names = kept["pieces"].tobytes().decode().split(" ")
         return {name: i for i, name in enumerate(names)}, kept["vectors"] * kept["scale"]

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from robospa.baselines.learned.act import Belief, Rows, calls_of, objects_of, possible
+from robospa.baselines.learned.act import Belief, Rows, calls_of, possible, told
 from robospa.baselines.learned.steps import Seen, State, Step, after
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.embodiment import Embodiment
@@ -207,11 +207,6 @@ class Learners:
     def __call__(self) -> Learned:
         """A policy for one connection."""
         return Learned(self.spec, self._look, self._decide)
-
-
-def told(observation: Observation) -> list[Seen]:
-    """What a policy without eyes is told."""
-    return objects_of(observation["environment_state"])
 
 
 def create(options: LearnedOptions) -> Learners:

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robospa.baselines.learned.act import Belief
-from robospa.baselines.learned.policy import Learned, LearnedOptions, create, told
+from robospa.baselines.learned.act import Belief, told
+from robospa.baselines.learned.policy import Learned, LearnedOptions, create
 from robospa.baselines.learned.steps import Seen, State, Step, labelled
 from robospa.harness.robots import embodiment
 from robospa.harness.sim.sapien_world import SapienWorld

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from robospa.baselines.learned.act import objects_of
+from robospa.baselines.learned.act import told
 from robospa.baselines.learned.steps import KINDS, TYPES, Step, labelled, model, pose_of, seen_at
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.skills import Expert
@@ -70,11 +70,9 @@ def test_states_are_where_physics_leads(name: str) -> None:
     while not expert.finished:
         for row in expert.next(world.snapshot()):
             world.step(row, "joint", lambda _: False)
-    told = objects_of(
-        world.observe(PolicySpec("eyes", (), environment_state=True))["environment_state"]
-    )
+    seen = told(world.observe(PolicySpec("eyes", (), environment_state=True)))
     for item in labelled(scene)[-1][0].objects:
         near = min(
-            math.dist(item.now.place, one.place) for one in told if one.kind == item.now.kind
+            math.dist(item.now.place, one.place) for one in seen if one.kind == item.now.kind
         )
         assert near < 0.02, item.now.kind
