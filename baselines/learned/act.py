@@ -70,10 +70,8 @@ LIFT, RISE = 0.08, 0.10
 def told(observation: Observation) -> list[Seen]:
     """The objects of an environment state: what a perfect eye would see."""
     codes = {tuple(kind_code(kind)): kind for kind in KINDS}
-    found = []
-    for numbers in (
-        observation["environment_state"].reshape(SLOTS, len(FEATURES)).astype(float).tolist()
-    ):
+    rows, found = observation["environment_state"].astype(float), []
+    for numbers in rows.reshape(SLOTS, len(FEATURES)).tolist():
         of = dict(zip(FEATURES, numbers, strict=True))
         if of["present"]:
             kind = codes[tuple(numbers[-12:])]
