@@ -173,26 +173,17 @@ def picture(scene: Scene, state: State) -> Picture:
     poses |= {o.name: o.pose for o in scene.clutter}
     renderer.sync(scene, embodiment(scene.embodiment), object_model)
     image = renderer.render([CameraSpec("head", WIDTH, HEIGHT)], links, poses, hinges)[0]
-    shown = [o.now for o in state.objects if o.visible]
-    shown += [
-        steps.seen_at(o.asset, model_of(o), o.pose) for o in scene.clutter if o.asset in KINDS
-    ]
-    rows = np.array([seen_numbers(s) for s in shown], np.float32).reshape(-1, SEEN_WIDTH)
+    lies = [steps.seen_at(o.asset, model_of(o), o.pose) for o in scene.clutter if o.asset in KINDS]
+    shown = [*(o.now for o in state.objects if o.visible), *lies]
+    rows = [seen_numbers(s) for s in shown if steps.in_picture(s)]
     packed = BytesIO()
     Image.fromarray(image).save(packed, "PNG", compress_level=1)
-    return Picture(packed.getvalue(), rows[in_picture(rows)])
+    return Picture(packed.getvalue(), np.array(rows, np.float32).reshape(-1, SEEN_WIDTH))
 
 
 def _pose(bottom: float, seen: Seen) -> Pose:
     x, y, z = seen.place
     return Pose((x, y, z - bottom), yaw_rotation(seen.turn))
-
-
-def in_picture(rows: Array, margin: float = 1.0) -> NDArray[np.bool_]:
-    """Which of the `Seen` rows (N, SEEN_WIDTH) have their middle in the picture."""
-    u, v = middle_pixel(rows)
-    inside = (u > margin) & (u < WIDTH - margin) & (v > margin) & (v < HEIGHT - margin)
-    return np.asarray(inside)
 
 
 def middle_pixel(rows: Array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -26,26 +26,10 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from robospa.baselines.learned import scenes
-from robospa.baselines.learned.perceive import (
-    FindNetwork,
-    MeasureNetwork,
-    find_losses,
-    measure_losses,
-    save_weights,
-)
-from robospa.baselines.learned.point import (
-    FIRST_WORD,
-    UNKNOWN,
-    Batch,
-    PointNetwork,
-    Vocabulary,
-    batch_of,
-    cell_places,
-    vocabulary_of,
-)
+from robospa.baselines.learned import perceive, point, scenes
+from robospa.baselines.learned.perceive import FindNetwork, MeasureNetwork
+from robospa.baselines.learned.point import Batch, PointNetwork, Vocabulary
 from robospa.baselines.learned.scenes import NOTHING, SEEN_WIDTH, Lesson, lesson
-from robospa.baselines.learned.steps import KINDS
 from robospa.harness.running.atomic_file import replace_file
 from robospa.protocol.options import option
 from robospa.tasks.catalog import tasks
@@ -56,7 +40,6 @@ BATCH, PICTURES, EVERY = 64, 16, 200
 """States and pictures of a step; a line, and what can be gone on from, after so many steps."""
 POINT_RATE, PERCEIVE_RATE, QUICK = 1.5e-3, 2e-3, 0.7
 """Learning rates; perception is trained at lower precision in so large a share of its steps."""
-BLOCK = KINDS.index("block")
 
 
 @dataclass(frozen=True)
@@ -64,10 +47,10 @@ class TrainOptions:
     """How much is made and learned."""
 
     blocks: Count = option(60, "lessons of so many scenes of each variant")
-    pictures: Count = option(48, "so many pictures of each variant")
-    point: Count = option(14_000, "steps of what chooses the next step")
-    find: Count = option(6_000, "steps of what finds objects in pictures")
-    measure: Count = option(12_000, "steps of what measures them")
+    pictures: Count = option(25, "so many pictures of each variant")
+    point: Count = option(8_000, "steps of what chooses the next step")
+    find: Count = option(4_600, "steps of what finds objects in pictures")
+    measure: Count = option(5_200, "steps of what measures them")
     seed: int = option(0, "seed of weights and batches")
 
 
@@ -155,7 +138,7 @@ class States:
         known = misheard(rng, said, [0.0, 0.1, 0.4])
         meanings = self._vocabulary.table[misheard(rng, said, [0.0, 0.0, 0.1])]
         seen = [misseen(rng, item.tokens[i]) for item, i in pairs]
-        batch = batch_of(seen, known, meanings, last.astype(np.int64))
+        batch = point.batch_of(seen, known, meanings, last.astype(np.int64))
         return batch, torch.from_numpy(np.stack([item.answers[i] for item, i in pairs]))
 
 
@@ -164,7 +147,9 @@ def misheard(
 ) -> NDArray[np.int64]:
     """Sentences (B, L), some with one of these shares of words that are not known."""
     share = rng.choice(shares, size=(len(words), 1))
-    return np.where((words >= FIRST_WORD) & (rng.random(words.shape) < share), UNKNOWN, words)
+    return np.where(
+        (words >= point.FIRST_WORD) & (rng.random(words.shape) < share), point.UNKNOWN, words
+    )
 
 
 WRONG = np.array([0, 0.003, 0.003, 0.002, 0.0012, 0.0012, 0.0012, 0.05, 0.02, 0.02, 0.02, 0.02])
@@ -182,7 +167,9 @@ def misseen(rng: np.random.Generator, tokens: NDArray[np.float32]) -> NDArray[np
         there = rows[:, 4] > 0
         rows += np.where(there[:, None], error, 0).astype(np.float32)
         rows[:, 4:7] = np.where(there[:, None], rows[:, 4:7].clip(0.002), 0)
-        quarter = np.where(there & (rows[:, 0] == BLOCK), rng.integers(4, size=len(rows)), 0)
+        quarter = np.where(
+            there & (rows[:, 0] == perceive.BLOCK), rng.integers(4, size=len(rows)), 0
+        )
         rows[:, 7] += quarter * (np.pi / 2)
         odd = quarter % 2 == 1
         rows[odd, 4:6] = rows[odd, 5:3:-1]
@@ -214,7 +201,7 @@ def _cross(liked: Tensor, right: Tensor, counts: Tensor) -> Tensor:
 
 def near(places: Tensor) -> Tensor:
     """(B, cells): how near cells are to places (B, 2), in shares of 1."""
-    away = (torch.from_numpy(cell_places())[None] - places[:, None]).square().sum(dim=2)
+    away = (torch.from_numpy(point.cell_places())[None] - places[:, None]).square().sum(dim=2)
     return (-away / (2 * 0.012**2)).softmax(dim=1)
 
 
@@ -234,17 +221,17 @@ def _lower() -> None:
 
 def _point(out: Path, options: TrainOptions) -> None:
     lessons = [lesson(scene) for n in range(options.blocks) for scene in scenes.scenes(n)]
-    vocabulary = Vocabulary(vocabulary_of(s for item in lessons for s in item.told))
+    vocabulary = Vocabulary(point.vocabulary_of((s for item in lessons for s in item.told), 2))
     states = States(lessons, vocabulary)
     torch.manual_seed(options.seed)
-    network = PointNetwork(FIRST_WORD + len(vocabulary.words))
+    network = PointNetwork(point.FIRST_WORD + len(vocabulary.words))
 
     def losses(step: int) -> dict[str, Tensor]:
         batch, answers = states.draw(np.random.default_rng([options.seed, step]), BATCH)
         return point_losses(network, batch, answers)
 
     Training(out, "point", network, options.point, POINT_RATE).run(losses, say)
-    save_weights(network, out / "point.npz")
+    perceive.save_weights(network, out / "point.npz")
     replace_file(out / "words.json", json.dumps(vocabulary.words).encode())
 
 
@@ -261,11 +248,11 @@ def _perceive(out: Path, name: str, options: TrainOptions) -> None:
         images, seen = [o.image for o in chosen], [o.seen for o in chosen]
         quick = step < QUICK * total
         if isinstance(network, FindNetwork):
-            return find_losses(network, images, seen, quick)
-        return measure_losses(network, rng, images, seen, quick)
+            return perceive.find_losses(network, images, seen, quick)
+        return perceive.measure_losses(network, rng, images, seen, quick)
 
     Training(out, name, network, total, PERCEIVE_RATE).run(losses, say)
-    save_weights(network, out / f"{name}.npz")
+    perceive.save_weights(network, out / f"{name}.npz")
 
 
 def train(out: Path, options: TrainOptions | None = None) -> None:
