@@ -53,10 +53,10 @@ def test_what_lies_around_the_picture_is_its_edge() -> None:
 
 
 def test_two_middles_as_near_as_a_few_pixels_are_one() -> None:
-    told = np.full((3, 30, 40), -9.0)
-    told[1:] = 0.0
-    told[0, 10, 10], told[0, 10, 11], told[0, 20, 30] = 3.0, 2.0, 1.0
-    told[1, 10, 11] = -0.9
+    told = np.full((1, 3, 30, 40), -9.0)
+    told[0, 1:] = 0.0
+    told[0, 0, 10, 10], told[0, 0, 10, 11], told[0, 0, 20, 30] = 3.0, 2.0, 1.0
+    told[0, 1, 10, 11] = -0.9
     np.testing.assert_allclose(perceive.middles(told), [[84, 84], [244, 164]])
 
 
