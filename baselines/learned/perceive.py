@@ -157,12 +157,15 @@ def seen_of(numbers: NDArray[np.float64], pixels: NDArray[np.float64]) -> list[S
     found = []
     for row, (x, y) in zip(numbers, places, strict=True):
         a, b, c = (float(h) for h in 0.03 * np.exp(row[3:6]))
+        kind = KINDS[int(row[NUMBERS:].argmax())]
         turns = [math.atan2(row[7 + 2 * i], row[6 + 2 * i]) / k for i, k in enumerate((1, 2, 4))]
         sure = [math.hypot(row[6 + 2 * i], row[7 + 2 * i]) > 0.6 for i in range(3)]
-        kind = KINDS[int(row[NUMBERS:].argmax())]
-        turn = next((t for t, s in zip(turns, sure, strict=True) if s), turns[0])
         if kind == "block":  # half turns of a bar, and quarter turns of a cube, look alike
             turn = turns[2] if a < SQUARE * b else turns[1]
+        else:  # what is known but for half or quarter turns, next to what else is believed
+            best = next((i for i in range(3) if sure[i]), 0)
+            part = 2 * math.pi / (1, 2, 4)[best]
+            turn = turns[best] + part * round((turns[0] - turns[best]) / part)
         red, green, blue = (float(value) for value in row[12:15].clip(0, 1))
         place, hinge = (float(x), float(y), float(TABLE_TOP + UNIT * row[2])), max(0.0, row[15])
         found.append(Seen(kind, place, (a, b, c), turn, (red, green, blue), float(hinge)))
