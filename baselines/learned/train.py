@@ -275,13 +275,15 @@ def train(out: Path, options: TrainOptions | None = None) -> None:
 
 def card_of(out: Path, options: TrainOptions) -> dict[str, object]:
     """What the weights in a folder say of themselves."""
-    files = [f"{name}.npz" for name in ("find", "measure", "point")] + ["words.json"]
-    hashes = {name: hashlib.sha256((out / name).read_bytes()).hexdigest() for name in files}
+    files = ["find.npz", "measure.npz", "point.npz", "words.json"]
+    paths = [*(out / name for name in files), point.PIECES]
+    hashes = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in paths}
     return {
         "name": "learned",
         "suite": SUITE,
         "learned_from": "drawn scenes and their plans: training seeds, split train, seen textures",
         "labels": "poses, sizes and kinds of the scenes' objects; steps of the expert's plans",
         "options": asdict(options),
+        "pieces": "pieces.npz is cut from the weights of wordllama (MIT, see LICENSE-wordllama)",
         "sha256": hashes,
     }
