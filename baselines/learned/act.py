@@ -203,7 +203,7 @@ def free_place(
 
 
 @dataclass
-class Hold:
+class Grip:
     """What an arm holds, how it lies in the hand, its width between the fingers [m], and where it
     was before."""
 
@@ -222,7 +222,7 @@ class Belief:
         self.columns = robot.action_space("joint").arms
         self.state = State(tuple(Tracked(one, one) for one in seen))
         self.poses = [pose_of(one) for one in seen]
-        self.held: list[Hold | None] = [None, None]
+        self.held: list[Grip | None] = [None, None]
         self.misses: dict[int, int] = {}
         """How often a gripper closed on nothing where an object seemed to be."""
         self.last: Rows | None = None
@@ -325,7 +325,7 @@ class Belief:
         shift = across * float(np.dot(point - np.array(best.point), across))
         px, py, pz = (np.array(pose.position) + shift).tolist()
         offset = end.inverse() * Pose((px, py, pz), pose.rotation)
-        self.held[arm] = Hold(target, offset, best.width, pose)
+        self.held[arm] = Grip(target, offset, best.width, pose)
 
     def _put(self, number: int, pose: Pose) -> None:
         self.poses[number] = pose

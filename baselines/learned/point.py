@@ -155,7 +155,7 @@ def relations(tokens: Tensor) -> Tensor:
 RELATIONS = 11
 
 
-class Reader(nn.Module):
+class SentenceReader(nn.Module):
     """Words to vectors that know their neighbours; attention of a control to them."""
 
     def __init__(self, words: int, width: int) -> None:
@@ -180,7 +180,7 @@ class Reader(nn.Module):
         return every, torch.cat([batch.words != EMPTY, torch.ones_like(batch.last) > 0], dim=1)
 
 
-class Layer(nn.Module):
+class ObjectLayer(nn.Module):
     """One reading of the words, one comparison of the objects."""
 
     def __init__(self, width: int, pair: int) -> None:
@@ -239,13 +239,13 @@ class PointNetwork(nn.Module):
 
     def __init__(self, words: int, width: int = 96, pair: int = 32) -> None:
         super().__init__()
-        self.words = Reader(words, width)
+        self.words = SentenceReader(words, width)
         self.kind = nn.Embedding(len(KINDS), 32)
         inner = 2 * (FEATURES + 32) + TOKEN_WIDTH - 2 * SEEN_WIDTH
         self.first = nn.Sequential(
             nn.Linear(inner, 2 * width), nn.ReLU(), nn.Linear(2 * width, width)
         )
-        self.layers = nn.ModuleList([Layer(width, pair) for _ in range(LAYERS)])
+        self.layers = nn.ModuleList([ObjectLayer(width, pair) for _ in range(LAYERS)])
         self.hop = nn.ModuleList([nn.Linear(width, width) for _ in range(LAYERS - 1)])
         self.hopped = nn.ModuleList(
             [nn.Linear(RELATIONS + width + 1, width) for _ in range(LAYERS - 1)]
