@@ -38,7 +38,7 @@ sim: ## Tests that run the simulator
 	$(BIN)/pytest -m sim $(SPREAD)
 
 learn: install ## Train the learned reference anew, in runs/learned (needs torch; a night of two cores)
-	$(BIN)/robospa learn runs/learned
+	$(BIN)/robospa learn
 
 test-models: install-dev ## LeRobot: tiny policies served, data sets loaded; in .venv-models (Python 3.12)
 	@[ -n "$$ROBOSPA_MODELS_PYTHON" ] || bash scripts/models.sh

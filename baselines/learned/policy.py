@@ -22,6 +22,7 @@ import numpy as np
 
 from robospa.baselines.learned.act import Belief, Rows, calls_of, possible, told
 from robospa.baselines.learned.steps import Seen, State, Step, after
+from robospa.extras import need
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.skills.expert import Expert
@@ -184,8 +185,7 @@ class Learners:
         folder = Path(options.path).expanduser() if options.path else WEIGHTS
         if not folder.is_dir() or not any(folder.iterdir()):
             raise FileNotFoundError(f"{folder} has no weights: robospa learn {folder} makes some")
-        import torch
-
+        torch = need("torch")
         from robospa.baselines.learned import perceive, point
 
         torch.set_num_threads(1)  # so that neighbours on the machine change nothing

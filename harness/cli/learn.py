@@ -10,7 +10,9 @@ import typer
 
 
 def learn(
-    out: Annotated[Path, typer.Argument(help="folder of the weights; the same one goes on")],
+    out: Annotated[Path, typer.Argument(help="folder of the weights; the same one goes on")] = Path(
+        "runs/learned"
+    ),
     option: Annotated[
         list[str] | None, typer.Option("--option", help="NAME=VALUE of the training; repeatable")
     ] = None,
