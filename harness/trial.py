@@ -33,8 +33,13 @@ from robospa.observation import Observation, View
 from robospa.protocol.errors import PolicyAnswerError, PolicyError
 from robospa.protocol.policy import Policy, PolicySpec, TrialInfo, check_chunk
 from robospa.results.records.action_problems import KINDS, ProblemKind
-from robospa.results.records.trial_record import PROCESSOR, EventRow, TrialRecord
-from robospa.results.scoring.comparable import LEAD, query_entries
+from robospa.results.records.trial_record import (
+    LEAD,
+    PROCESSOR,
+    EventRow,
+    TrialRecord,
+    query_entries,
+)
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.catalog import task as find_task
 from robospa.tasks.descriptions import describe_objects

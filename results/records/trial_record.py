@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Annotated, Any, TypedDict
 
 from robospa.schema import Count, Integer, Number, one_of
@@ -11,6 +13,12 @@ from robospa.trial import TrialKey
 
 PROCESSOR = "processor"
 """Entry of `timing` with a trial's processor time [s]; the others share out its wall time."""
+
+LEAD = "lead"
+"""The diagnostic that says by how much [m] what is asked for is ahead of what comes closest."""
+CHUNKS, LAST_QUERY = "chunks", "last_query"
+"""The diagnostics of a trial's queries: how many were followed by so many actions until the next,
+by that number, and how many actions had been begun at the last one."""
 
 END_REASONS = (
     "success",
@@ -120,3 +128,12 @@ class TrialRecord:
     """What the task measured besides success."""
     video: str = ""
     """Path of the video in the run's folder, which follows the record; empty for none."""
+
+
+def query_entries(asked: Sequence[int], steps: int) -> dict[str, object]:
+    """What a record of `steps` actions keeps of its queries: `asked` says how many actions had been
+    begun at each."""
+    if not asked:
+        return {}
+    lengths = Counter(after - before for before, after in pairwise((*asked, steps)))
+    return {CHUNKS: {str(n): lengths[n] for n in sorted(lengths)}, LAST_QUERY: asked[-1]}

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from itertools import accumulate, chain, pairwise
+from itertools import accumulate, chain
 
 from robospa.results.failures.attribution import MEMORY
-from robospa.results.records.trial_record import TrialRecord
+from robospa.results.records.trial_record import CHUNKS, LAST_QUERY, LEAD, TrialRecord
 from robospa.results.scoring.models import ModelResults, restricted, results_of_records
 from robospa.results.scoring.scores import level_name
 from robospa.results.tables import Table, TableCell, TableRow, estimate_cell
@@ -21,22 +21,8 @@ from robospa.trial import CATEGORY_NAMES
 
 LEVELS = (1, 2, 3, 4, 5, 0)
 """All levels, and their mean."""
-LEAD = "lead"
-"""The diagnostic that says by how much [m] what is asked for is ahead of what comes closest."""
-CHUNKS, LAST_QUERY = "chunks", "last_query"
-"""The diagnostics of a trial's queries: how many were followed by so many actions until the next,
-by that number, and how many actions had been begun at the last one."""
 CLEAR = 0.06
 """The official lead [m] of the Multi View tasks."""
-
-
-def query_entries(asked: Sequence[int], steps: int) -> dict[str, object]:
-    """What a record of `steps` actions keeps of its queries: `asked` says how many actions had been
-    begun at each."""
-    if not asked:
-        return {}
-    lengths = Counter(after - before for before, after in pairwise((*asked, steps)))
-    return {CHUNKS: {str(n): lengths[n] for n in sorted(lengths)}, LAST_QUERY: asked[-1]}
 
 
 def executed_chunks(record: TrialRecord) -> Counter[int]:

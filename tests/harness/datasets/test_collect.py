@@ -34,7 +34,7 @@ from robospa.harness.seeds.attempt import Attempt
 from robospa.harness.settings import Compute, SettingsError
 from robospa.leaderboard.reproduce import FIRST as FIRST_HIDDEN
 from robospa.results.records.manifest import RunError
-from robospa.tasks.seeds import FIRST_TRAINING_SEED, LAST_TRAINING_SEED, ListKey
+from robospa.tasks.seeds import FIRST_TRAINING_SEED, LAST_TRAINING_SEED, ListKey, read_lists
 
 KILLS = 12
 FIRST = ListKey("Pick_Blocks_Size", 1)
@@ -285,7 +285,7 @@ def test_what_cannot_be_is_refused(
 
 def test_no_evaluation_and_no_measurement_has_a_training_seed() -> None:
     files = sorted((ROOT / "tasks/seeds").rglob("*.json"))
-    lists = [seeds for path in files for seeds in json.loads(path.read_text()).values()]
+    lists = [seeds for path in files for seeds in read_lists(path.read_text()).values()]
     assert len(lists) >= 355 and TRAINING.stop <= FIRST_HIDDEN
     assert all(TRAINING.stop <= min(seeds) or max(seeds) < TRAINING.start for seeds in lists)
     for path in (*ROOT.glob("benchmarks/*.py"), *ROOT.glob("tools/*.py")):

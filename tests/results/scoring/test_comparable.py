@@ -10,14 +10,13 @@ from typing import Any
 import pytest
 from fake_runs import make_run, record
 
-from robospa.results.records.trial_record import TrialRecord
+from robospa.results.records.trial_record import TrialRecord, query_entries
 from robospa.results.report.page import write_report
 from robospa.results.report.report import make_report
 from robospa.results.scoring.comparable import (
     comparable_table,
     executed_chunks,
     median,
-    query_entries,
 )
 from robospa.results.scoring.models import results_of_run
 
