@@ -59,7 +59,7 @@ class Animation(FilmRecorder):
 
     def __init__(self, drawn: Callable[[Image.Image], Image.Image], every: int = 1) -> None:
         super().__init__([CAMERA])
-        self._drawn, self._every, self._count = drawn, every, 0
+        self._page, self._every, self._count = drawn, every, 0
         self.frames: list[Image.Image] = []
 
     def add(self, image: NDArray[np.uint8]) -> None:
@@ -67,7 +67,7 @@ class Animation(FilmRecorder):
         from PIL import Image
 
         if self._count % self._every == 0:
-            self.frames.append(self._drawn(Image.fromarray(image)))
+            self.frames.append(self._page(Image.fromarray(image)))
         self._count += 1
 
 
