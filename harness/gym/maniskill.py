@@ -349,7 +349,7 @@ Tree = dict[str, Any]
 
 
 def variant_id(task: str, level: int) -> str:
-    """The id of a variant, such as RoboSPA-Pick_Blocks_Size-L3-v2, where 2 is the suite's
+    """The id of a variant, such as RoboSPA-Pick_Blocks_Size-L3-v3, where 3 is the suite's
     version."""
     return f"RoboSPA-{task}-L{level}-v{SUITE.rpartition('-')[2]}"
 

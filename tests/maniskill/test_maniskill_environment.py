@@ -31,7 +31,7 @@ from mani_skill.vector.wrappers.gymnasium import ManiSkillVectorEnv  # noqa: E40
 import robospa.maniskill  # noqa: E402, F401
 from robospa.tasks.catalog import tasks  # noqa: E402
 
-ID = "RoboSPA-Pick_Blocks_Size-L1-v2"
+ID = "RoboSPA-Pick_Blocks_Size-L1-v3"
 FAKE: dict[str, Any] = {
     "world": "run_fakes:FakeWorld",
     "parts": "run_fakes:parts",
@@ -171,7 +171,7 @@ def test_the_simulator_ends_as_in_a_run() -> None:
     world = SapienWorld(render=False)
     run_trial(world, chunks, key, policy_seed=0, step_scale=0.02)
     digest = world.digest()
-    env = gymnasium.make("robospa.maniskill:RoboSPA-Pick_Blocks_Size-L3-v2", obs_mode="rgb+state")
+    env = gymnasium.make("robospa.maniskill:RoboSPA-Pick_Blocks_Size-L3-v3", obs_mode="rgb+state")
     observation, _ = env.reset(seed=100000)
     assert observation["sensor_data"]["head"]["rgb"].float().std() > 5
     assert observation["state"].shape == (1, 42 + 640)

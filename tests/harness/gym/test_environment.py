@@ -205,7 +205,7 @@ def test_the_simulator_ends_as_in_a_run() -> None:
     key = TrialKey("Pick_Blocks_Size", 3, 100000)
     record = run_trial(SapienWorld(render=False), chunks, key, policy_seed=0, step_scale=0.02)
     env = gymnasium.make(
-        "robospa.gym:RoboSPA/Pick_Blocks_Size-v2", level=3, cameras=["head"], step_scale=0.02
+        "robospa.gym:RoboSPA/Pick_Blocks_Size-v3", level=3, cameras=["head"], step_scale=0.02
     )
     observation, info = env.reset(seed=100000)
     assert observation["images"]["head"].std() > 5
