@@ -90,11 +90,19 @@ ALONE = ("pick", "press", "open", "lift", "back", "move")
 """Types of steps that need no destination."""
 
 
+def imagined(item: Tracked) -> bool:
+    """Whether an object is in the imagined scene: it is seen, or hidden but on the table."""
+    return item.visible or item.now.place[2] > TABLE_TOP - 0.1
+
+
 def possible(step: Step, state: State) -> bool:
     """Whether a step can be tried at all."""
     if step.type == "wait" or step.type == "done":
         return True
     if step.object is None or step.object == step.destination:
+        return False
+    named = [state.objects[i] for i in (step.object, step.destination) if i is not None]
+    if not all(imagined(item) for item in named):
         return False
     if step.destination is None:
         return step.type in ALONE and (step.type != "move" or step.place is not None)
@@ -233,7 +241,7 @@ class Belief:
         items = tuple(
             SceneObject(str(i), o.now.kind, self.poses[i], params_of(o.first))
             for i, o in enumerate(self.state.objects)
-            if o.visible or o.now.place[2] > TABLE_TOP - 0.1
+            if imagined(o)
         )
         return Scene("imagined", 1, 0, self.robot.name, "clean", items, {})
 

@@ -22,8 +22,10 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from robospa.baselines.learned.scenes import middle_pixel
-from robospa.baselines.learned.steps import KINDS, Seen
+from robospa.baselines.learned.steps import KINDS, Seen, seen_at
 from robospa.harness.running.atomic_file import replace_file
+from robospa.tasks.families.dustbin import BIN
+from robospa.tasks.objects import object_model
 from robospa.workcell import HEIGHT, TABLE_TOP, WIDTH, WORKCELL
 
 WEIGHTS = Path(__file__).parent / "weights"
@@ -155,9 +157,13 @@ def seen_of(numbers: NDArray[np.float64], pixels: NDArray[np.float64]) -> list[S
     """What the measuring network says (K, NUMBERS + KINDS) of pixels (K, 2), as objects."""
     places = table_place(pixels) + numbers[:, :2] * UNIT
     found = []
+    bin_seen = seen_at("dustbin", object_model("dustbin", {"look": 0}), BIN)
     for row, (x, y) in zip(numbers, places, strict=True):
         a, b, c = (float(h) for h in 0.03 * np.exp(row[3:6]))
         kind = KINDS[int(row[NUMBERS:].argmax())]
+        if kind == "dustbin":  # it always stands at the same place, and only its rim is in view
+            found.append(bin_seen)
+            continue
         turns = [math.atan2(row[7 + 2 * i], row[6 + 2 * i]) / k for i, k in enumerate((1, 2, 4))]
         sure = [math.hypot(row[6 + 2 * i], row[7 + 2 * i]) > 0.6 for i in range(3)]
         if kind == "block":  # half turns of a bar, and quarter turns of a cube, look alike

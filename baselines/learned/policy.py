@@ -37,6 +37,8 @@ Decide = Callable[[State, str], Step]
 REPEATED = ("press", "lift", "stamp", "hit")
 """Steps of which several are done in one go: between them nothing is to be seen."""
 AT_ONCE, TRIES = 30, 3
+IDLE = 10
+"""Actions of an answer that holds still, where nothing more is to be done."""
 ARRIVED = {"move": 0.025, "back": 0.025, "dock": 0.05, "hang": 0.06}
 """How far [m] from its place something may be after a step of a type."""
 TURNED = 0.25
@@ -86,7 +88,7 @@ class Learned:
                 return rows
             self._end(belief)
         last = observation["state"] if belief.last is None else belief.last
-        return np.asarray(last, np.float32)[None]
+        return np.repeat(np.asarray(last, np.float32)[None], IDLE, axis=0)
 
     def _begin(self, belief: Belief, observation: Observation) -> None:
         """Decide what is next; nothing if all is done."""

@@ -10,12 +10,10 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, wait
 from dataclasses import asdict, dataclass
-from multiprocessing import get_context
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -30,6 +28,7 @@ from robospa.baselines.learned import perceive, point, scenes
 from robospa.baselines.learned.perceive import FindNetwork, MeasureNetwork
 from robospa.baselines.learned.point import Batch, PointNetwork, Vocabulary
 from robospa.baselines.learned.scenes import NOTHING, SEEN_WIDTH, Lesson, lesson
+from robospa.harness.pool import JobProcess, Pool
 from robospa.harness.running.atomic_file import replace_file
 from robospa.protocol.options import option
 from robospa.tasks.catalog import tasks
@@ -213,10 +212,25 @@ def say(text: str) -> None:
     print(text, flush=True)
 
 
-def _lower() -> None:
-    """A worker leaves the machine to others, and takes one core."""
-    os.nice(5)
+PARTS = ("pictures 0", "pictures 1"), ("measure", "find", "point")
+"""What is made by two workers, one after the other; then what is learned from it."""
+
+
+def _worker(argument: tuple[Path, TrainOptions]) -> Callable[[str], None]:
+    """What does a part of the recipe, on one core."""
+    out, options = argument
     torch.set_num_threads(1)
+
+    def work(part: str) -> None:
+        name, _, half = part.partition(" ")
+        if name == "pictures":
+            scenes.make(out / "made", range(int(half), options.pictures, 2), say)
+        elif name == "point":
+            _point(out, options)
+        else:
+            _perceive(out, name, options)
+
+    return work
 
 
 def _point(out: Path, options: TrainOptions) -> None:
@@ -261,13 +275,11 @@ def train(out: Path, options: TrainOptions | None = None) -> None:
     """
     options = options or TrainOptions()
     begun = time.monotonic()
-    halves = [range(k, options.pictures, 2) for k in (0, 1)]
-    with ProcessPoolExecutor(2, get_context("spawn"), _lower) as workers:
-        wait([workers.submit(scenes.make, out / "made", half, say) for half in halves])
-        learning = [workers.submit(_perceive, out, name, options) for name in ("measure", "find")]
-        learning.append(workers.submit(_point, out, options))
-        for task in learning:
-            task.result()
+    start = partial(JobProcess, _worker, (out, options), name="learner", nice=5)
+    with Pool[str, None](start, 2) as pool:
+        for parts in PARTS:
+            for done in [pool.submit(part) for part in parts]:
+                done.result()
     card = card_of(out, options)
     replace_file(out / "card.json", (json.dumps(card, indent=1) + "\n").encode())
     say(f"done in {(time.monotonic() - begun) / 60:.0f} min: {out}")

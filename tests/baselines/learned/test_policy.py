@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robospa.baselines.learned.act import Belief, told
+from robospa.baselines.learned.act import Belief, possible, told
 from robospa.baselines.learned.policy import Learned, LearnedOptions, create
-from robospa.baselines.learned.steps import Seen, State, Step, labelled
+from robospa.baselines.learned.steps import Seen, State, Step, Tracked, labelled
 from robospa.harness.robots import embodiment
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import run_trial
@@ -122,6 +122,13 @@ def test_what_is_seen_again_is_what_it_was() -> None:
     assert items[2].now == bell and not items[2].at_start
     belief.look([bell])
     assert [o.visible for o in belief.state.objects] == [False, False, True]
+
+
+def test_what_is_hidden_below_the_table_cannot_be_acted_on() -> None:
+    can = Seen("can", (-0.4, 0.0, 0.2), (0.03, 0.03, 0.06), 0.0, (1.0, 0.0, 0.0))
+    thrown = State((Tracked(can, can, visible=False),))
+    assert not possible(Step("pick", 0), thrown)
+    assert possible(Step("pick", 0), State((Tracked(can, can),)))
 
 
 def test_a_folder_without_weights_is_refused(tmp_path: Path) -> None:
