@@ -30,6 +30,7 @@ ALLOWED = {
         "harness.demonstrations",
         "harness.datasets",
         "harness.clock",
+        "harness.pool",
         "action_space",
         "harness.running.atomic_file",
         "clients.model_policy",
