@@ -21,6 +21,7 @@ from robospa.results.scoring.comparable import (
     median,
 )
 from robospa.results.scoring.first_choice import first_choice, held_at_start
+from robospa.results.scoring.grounding import Grounding, Place, groundings, tally_of
 from robospa.results.scoring.models import results_of_run
 from robospa.results.scoring.scores import Scores, score_run
 from robospa.results.tables import Table
@@ -56,6 +57,11 @@ class LoadedRun(Run):
         `lead` [m] and `asked_again` of the frame say why."""
         return comparable(results_of_run(self, ci=ci)).scores
 
+    def grounding(self) -> dict[Place, Grounding]:
+        """What was chosen and what came of it, by task, category, dimension or "overall", and level
+        (0: all): `run.grounding()["GAC", 0].execution` (`docs/statistics.md`)."""
+        return groundings(r for r in self.records.values() if finished(r))
+
     def failures(self) -> FailedTrials:
         """A list of every failed trial with the type of its failure and the evidence for it;
         `print` and a notebook show a line of each."""
@@ -69,7 +75,9 @@ class LoadedRun(Run):
         pandas, which the extra `notebook` brings.
         """
         frame = need("pandas").DataFrame(trial_columns(self))
-        kinds = dict.fromkeys(FLAGS, "boolean") | dict.fromkeys((*COUNTS, *PROBLEMS), "Int64")
+        kinds = dict.fromkeys(FLAGS, "boolean") | dict.fromkeys(
+            (*COUNTS, *PROBLEMS, *CHOICES), "Int64"
+        )
         kinds |= dict.fromkeys(NUMBERS, "float64")
         return frame.astype(kinds)
 
@@ -144,6 +152,11 @@ NUMBERS: Mapping[str, Callable[[TrialRecord], Cell]] = {
 """`progress`: the share of subtasks that hold at the end, `idle_progress`: before the first action;
 `lead` [m]: of what is asked for; `chunk`: actions executed of an answer, the median;
 `wall_time` [s]; latencies [ms]."""
+CHOICES: Mapping[str, Callable[[TrialRecord], Cell]] = {
+    "choices": lambda record: tally_of(record).chosen,
+    "right_choices": lambda record: tally_of(record).right,
+    "carried_out": lambda record: tally_of(record).done,
+}
 PROBLEMS = {kind.name: _problem(kind.name) for kind in KINDS}
 """How many actions were executed otherwise than they were sent, by kind."""
 
@@ -156,8 +169,8 @@ def _latency(record: TrialRecord, name: str) -> float | None:
 def trial_columns(run: Run) -> dict[str, list[Cell]]:
     """The listed trials of `run` by column, in their order.
 
-    Columns: the fields of the key, `end`, FLAGS, COUNTS, PROBLEMS, NUMBERS, TEXTS. A trial without
-    a result (`end` is "infrastructure" or "not run") has None in all but its key.
+    Columns: the fields of the key, `end`, FLAGS, COUNTS, PROBLEMS, CHOICES, NUMBERS, TEXTS. A trial
+    without a result (`end` is "infrastructure" or "not run") has None in all but its key.
     """
     records = [_result(run, key) for key in run.keys]
     columns: dict[str, list[Cell]] = {
@@ -168,6 +181,7 @@ def trial_columns(run: Run) -> dict[str, list[Cell]]:
         **FLAGS,
         **{name: _count(name) for name in COUNTS},
         **PROBLEMS,
+        **CHOICES,
         **NUMBERS,
         **TEXTS,
     }

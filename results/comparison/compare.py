@@ -24,6 +24,7 @@ from robospa.results.comparison.pairs import (
 from robospa.results.paper.columns import published_results
 from robospa.results.records.manifest import RunError
 from robospa.results.records.runs import MARK, Run, by_setting, read_part, setting_name
+from robospa.results.scoring.grounding import differences
 from robospa.results.scoring.models import (
     FREE,
     IncomparableError,
@@ -134,6 +135,7 @@ def compare_results(
         + tuple(replace(g, q=g.p) for g in groups if g.kind != "category"),
         tuple(notes(first, second, [pair.variant for pair in pairs], listed, paired))
         + tuple(_by_first_choice(first, second, method) if runs and metric == "sr" else ())
+        + (differences(first, second) if runs and metric == "sr" else ())
         + (tuple(worst_and_best(first, second, metric)) if metric not in ("onta", "onta1") else ()),
         banner_of(first, second),
     )

@@ -27,6 +27,7 @@ from robospa.results.report.score_table import percent
 from robospa.results.report.tables import for_page, write_files
 from robospa.results.report.trials import failure_counts, trial_rows
 from robospa.results.scoring.comparable import comparable
+from robospa.results.scoring.grounding import grounding_data, records_of
 from robospa.results.scoring.scores import Scores, to_json
 from robospa.results.statistics.intervals import Estimate
 from robospa.results.tables import escape_markdown, to_markdown
@@ -269,6 +270,7 @@ def to_data(report: Report) -> dict[str, object]:
                 "run": about(run),
                 **to_json(model.scores),
                 "comparable": to_json(comparable(model).scores),
+                "grounding": grounding_data(records_of(model)),
                 "ends": ends(run),
                 "problems": problem_data(run.records.values()),
             }

@@ -19,7 +19,7 @@ from robospa.results.paper.columns import Column, check_columns, column_of, resu
 from robospa.results.paper.origin import banner, origin_of
 from robospa.results.records.runs import Run, by_setting, finished
 from robospa.results.report.run_card import names_of
-from robospa.results.report.score_table import loss_lines, missing_lines
+from robospa.results.report.score_table import BESIDE, loss_lines, missing_lines
 from robospa.results.report.tables import (
     ReportTable,
     beside_runs,
@@ -28,7 +28,6 @@ from robospa.results.report.tables import (
     report_tables,
     shared_variants,
 )
-from robospa.results.scoring.comparable import comparable_table
 from robospa.results.scoring.models import IncomparableError, ModelResults, results_of_run
 from robospa.trial import TrialKey
 
@@ -97,13 +96,13 @@ def make_report(
 
 
 def _tables(own: Sequence[ModelResults], columns: Sequence[Column]) -> list[ReportTable]:
-    """The paper's tables, after those of one policy's robots, scene modes or splits and of the
-    trials that compare."""
+    """The paper's tables, after those of one policy's robots, scene modes or splits, of grounding
+    and execution, and of the trials that compare."""
     if not columns:
         return []
     axes = [table for metric in ("sr", "sr1") if (table := by_axis(own, metric))]
-    comparable = [table] if (table := comparable_table(own)) else []
-    ours = [ReportTable(table, False) for table in (*axes, *comparable)]
+    beside = [table for made in BESIDE if (table := made(own))]
+    ours = [ReportTable(table, False) for table in (*axes, *beside)]
     return [*ours, *report_tables(columns)]
 
 

@@ -15,6 +15,7 @@ from robospa.results.records.runs import Run, by_setting, finished, setting_name
 from robospa.results.report.run_card import ends
 from robospa.results.scoring.comparable import comparable_table
 from robospa.results.scoring.first_choice import after_others
+from robospa.results.scoring.grounding import grounding_table
 from robospa.results.scoring.models import ModelResults
 from robospa.results.scoring.repeats import policy_error_lines, repeat_lines
 from robospa.results.scoring.scores import (
@@ -125,11 +126,15 @@ def _level_cell(part: VariantScore | AverageScore | None) -> TableCell:
     return TableCell(short(part.values.get("sr")), sign=MISSING * bool(part.missing))
 
 
+BESIDE = (grounding_table, comparable_table)
+"""Tables that a report has beside the paper's."""
+
+
 def print_scores(run: Run, results: ModelResults) -> None:
     """Print the tables of `run` on the terminal: how its trials ended, why some are missing, are
     policy errors or were repeated, which actions could not be executed as they were sent."""
     scores = results.scores
-    for table in (score_table(run, scores), comparable_table([results])):
+    for table in (score_table(run, scores), *(of([results]) for of in BESIDE)):
         if table is not None:
             show(table)
     console = plain_console(wide=130)

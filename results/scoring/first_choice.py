@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from robospa.results.failures.attribution import MEMORY, Cause, mistakes_of, roles_of
-from robospa.results.records.trial_record import TrialRecord
+from robospa.results.failures.attribution import MEMORY, mistakes_of, roles_of
+from robospa.results.records.trial_record import EventRow, TrialRecord
 from robospa.results.statistics.significance import at_least
 from robospa.text import some
 from robospa.trial import BASIC, PROCEDURAL, SPATIAL
@@ -41,7 +41,7 @@ def first_choice(record: TrialRecord) -> bool:
         return False
     wrong = set(OF_CHOICE) - (set(EARLY) if free else set())
     causes = mistakes_of(record)
-    return not any(cause.kind in wrong and not _in_passing(cause, record) for cause in causes)
+    return not any(cause.kind in wrong and not in_passing(cause.event, record) for cause in causes)
 
 
 def took_another(record: TrialRecord) -> bool:
@@ -59,12 +59,11 @@ def took_another(record: TrialRecord) -> bool:
     return False
 
 
-def _in_passing(cause: Cause, record: TrialRecord) -> bool:
+def in_passing(press: EventRow, record: TrialRecord) -> bool:
     """Whether an early press in a composite action came about on the way to what was due.
 
     A finger that flies past closely enough presses, by the official rule; it happens to the expert.
     """
-    press = cause.event
     if record.category != "CAC" or press["kind"] != "wrong_order":
         return False
     if press["object"] not in record.diagnostics.get("pressed", ()):

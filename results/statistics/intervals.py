@@ -49,6 +49,26 @@ def wilson(successes: float, trials: float, z: float = Z95) -> Estimate:
     return Estimate(p, low, high, "Wilson")
 
 
+def clustered(trials: Sequence[tuple[int, int]]) -> Estimate | None:
+    """Rate of things that come several to a trial, as (good, all) a trial; None if there are none.
+
+    Wilson's interval for as many independent things as tell as much: what a trial has in common
+    makes them fewer, and where all are alike they are as many as the trials.
+    """
+    trials = [one for one in trials if one[1]]
+    good, count = (sum(one[i] for one in trials) for i in (0, 1))
+    if not count:
+        return None
+    rate = good / count
+    if good in (0, count):
+        worth = float(len(trials))
+    else:
+        spread = sum((k - rate * n) ** 2 for k, n in trials) / (count * rate * (1 - rate))
+        worth = count / max(1.0, spread * len(trials) / max(1, len(trials) - 1))
+    found = wilson(rate * worth, worth)
+    return replace(found, value=rate, method="Wilson" if worth == count else "Wilson, by trials")
+
+
 def exact(successes: int, trials: int) -> Estimate:
     """Rate with the interval of Clopper and Pearson: covers at least 95 %, often more."""
     from scipy.special import betaincinv
@@ -101,7 +121,7 @@ def mean(parts: Sequence[Estimate]) -> Estimate:
 
 def chance_corrected(rate: Estimate, candidates: int) -> Estimate:
     """ONTA of a success rate among `candidates` objects: 0 at chance 1/n, 1 at certainty."""
-    return _affine(rate, *scale_and_shift(candidates))
+    return rescaled(rate, *scale_and_shift(candidates))
 
 
 def difference(first: Estimate, second: Estimate) -> Estimate:
@@ -150,10 +170,10 @@ def paired_sample_difference(gaps: Sample) -> Estimate:
     if 0 < abs(gaps.total - reach * gaps.trials) < reach * gaps.trials and reach > 1:
         found = paired_difference(0, 0, gaps.trials)  # all differ by the same part of a whole
         return replace(
-            _affine(found, reach * gaps.scale, gaps.value), method="Tango, as for equals"
+            rescaled(found, reach * gaps.scale, gaps.value), method="Tango, as for equals"
         )
     found = paired_difference(gaps.counts[-1], gaps.counts[0], gaps.trials)
-    return _affine(found, reach * gaps.scale, 0.0)
+    return rescaled(found, reach * gaps.scale, 0.0)
 
 
 def paired_mean(gaps: Sequence[Sample], weights: Sequence[float]) -> Estimate:
@@ -220,17 +240,18 @@ _RATES: dict[str, Callable[[int, int], Estimate]] = {
 def _cell(sample: Sample, method: str, seed: int) -> Estimate:
     """One variant. Progress that never varies is bounded by the rate of any progress at all."""
     if sample.binary:
-        return _affine(_RATES[method](sample.total, sample.trials), sample.scale, sample.shift)
+        return rescaled(_RATES[method](sample.total, sample.trials), sample.scale, sample.shift)
     n = sample.trials
     if sample.counts[0] == n or sample.counts[-1] == n:
         bound = _RATES[method](n if sample.counts[-1] else 0, n)
         top = len(sample.counts) - 1
         name = f"bootstrap, {bound.method} where all are equal"
-        return replace(_affine(bound, sample.scale * top, sample.shift), method=name)
+        return replace(rescaled(bound, sample.scale * top, sample.shift), method=name)
     return _percentile(sample.value, draw([sample], [1.0], seed), "bootstrap")
 
 
-def _affine(estimate: Estimate, scale: float, shift: float) -> Estimate:
+def rescaled(estimate: Estimate, scale: float, shift: float) -> Estimate:
+    """`shift + scale * estimate`."""
     value, low, high = (shift + scale * x for x in (estimate.value, estimate.low, estimate.high))
     return Estimate(value, low, high, estimate.method)
 

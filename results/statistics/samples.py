@@ -23,7 +23,11 @@ from numpy.typing import NDArray
 def scale_and_shift(candidates: int) -> tuple[float, float]:
     """ONTA as `shift + scale * rate`; ValueError if there are fewer than two candidates."""
     _check_candidates(candidates)
-    chance = 1 / candidates
+    return scale_of_chance(1 / candidates)
+
+
+def scale_of_chance(chance: float) -> tuple[float, float]:
+    """A rate as `shift + scale * rate` that is 0 where the rate is `chance`, and 1 at 1."""
     return 1 / (1 - chance), -chance / (1 - chance)
 
 
