@@ -95,7 +95,7 @@ def executed_paths(path: Path, count: int) -> tuple[Run, dict[TrialKey, Trace]]:
     chosen = _spread(good, count)
     if bundle:
         traces = read_traces(bundle, chosen)
-        spaces = {key: spec_of(bundle.settings, key.task).action for key in chosen}
+        spaces = {key: spec_of(bundle.settings, key.task).space for key in chosen}
     else:
         files = {key: action_path(path, key) for key in chosen}
         read = {key: read_actions(file) for key, file in files.items()}

@@ -127,7 +127,7 @@ class CardTraining(Struct, frozen=True, forbid_unknown_fields=True):
 class CardActions(Struct, frozen=True, forbid_unknown_fields=True):
     """The space of the model's actions, how many make a chunk, and their rate [Hz] in the data."""
 
-    space: Annotated[str, one_of(("joint", "ee", "delta_ee"))]
+    space: Annotated[str, one_of(("joint", "ee", "delta_ee", "skill"))]
     chunk: Annotated[int, Meta(ge=1, le=10_000)]
     rate: Annotated[int, Meta(gt=0, le=10_000)] | Annotated[float, Meta(gt=0, le=10_000)]
 

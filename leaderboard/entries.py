@@ -21,6 +21,7 @@ from robospa.results.paper import rounding
 from robospa.results.paper.columns import Column, published_column
 from robospa.results.paper.origin import DIFFERENCES
 from robospa.results.paper.published import LEVELS, load
+from robospa.results.records.manifest import JOINTS
 from robospa.results.scoring.scores import to_json
 from robospa.trial import CATEGORIES, DIMENSIONS, METRICS
 
@@ -33,9 +34,10 @@ class Group:
     embodiment: str
     mode: str
     split: str
+    track: str = JOINTS
 
     def __str__(self) -> str:
-        return ", ".join(astuple(self))
+        return ", ".join(part for part in astuple(self) if part != JOINTS)
 
     @property
     def of_paper(self) -> bool:
@@ -52,7 +54,9 @@ class Group:
         """The group in words."""
         if self.of_paper:
             return f"Numbers printed in the paper: {self.embodiment}, {self.mode} scenes"
-        return f"{self.suite}: {self.embodiment}, {self.mode} scenes, {self.split} instructions"
+        track = "" if self.track == JOINTS else f"Track of {self.track}, "
+        setting = f"{self.embodiment}, {self.mode} scenes, {self.split} instructions"
+        return f"{track}{self.suite}: {setting}"
 
     @property
     def note(self) -> str:
@@ -64,7 +68,7 @@ class Group:
 
 def group(entry: Entry) -> Group | None:
     """The group of `entry`; None if it does not state all parts, so that it is in nobody's."""
-    found = Group(entry.suite, entry.embodiment, entry.mode, entry.split)
+    found = Group(entry.suite, entry.embodiment, entry.mode, entry.split, entry.track)
     return found if all(astuple(found)) else None
 
 
@@ -149,6 +153,11 @@ class Entry:
     """"ROW/LEVEL" where hidden scenes would have shown a lie."""
 
     @property
+    def track(self) -> str:
+        """What it answers in, beside which nothing of another track is ranked."""
+        return ", ".join(self.column.results.setting.track)
+
+    @property
     def badge(self) -> str:
         """The strongest one."""
         return max(self.badges, key=list(BADGES).index)
@@ -210,6 +219,7 @@ def entry_of(submission: Submission) -> Entry:
         ("scene mode", run.settings.mode[0]),
         ("instructions", run.settings.split[0]),
         ("suite", run.suite),
+        ("track", column.results.setting.track[0]),
         ("bundle", submission.bundle),
     )  # fmt: skip
     return Entry(

@@ -102,7 +102,7 @@ def replay(
     """
     keys = drawn(challenge, valid.manifest.bundle, valid.keys, count)
     traces = read_traces(valid, keys)
-    spaces = {key: spec_of(valid.settings, key.task).action for key in keys}
+    spaces = {key: spec_of(valid.settings, key.task).space for key in keys}
     jobs = [(valid.run.records[key], traces[key], spaces[key]) for key in keys]
     found: dict[TrialKey, Replayed] = {}
     where = (reference.world, reference.parts)

@@ -122,6 +122,8 @@ def _catalog_parts(key: TrialKey) -> _TaskOnly:
     return _TaskOnly(tasks()[key.task])
 
 
+SPACES = tuple(dict.fromkeys((*KINDS, "skill")))
+"""What a policy may answer in: points move nothing, so that nothing could be replayed."""
 CONTROLS = ("rest_to_rest",)
 """Ways of executing an action that the benchmark's numbers are made with."""
 ONE = ("embodiment", "mode", "split")
@@ -179,10 +181,12 @@ def check_settings(run: RunManifest, reference: Reference) -> RunSettings:
             )
     if extra := sorted(set(settings.policies) - set(run.categories)):
         raise BundleError(f"the run has a policy for {extra[0][:60]!a}, but no trials of it")
+    if len(run.tracks) > 1:
+        raise BundleError(f"the run mixes the tracks {' and '.join(run.tracks)}; a bundle has one")
     for stated in settings.stated:
-        if stated.action not in KINDS:
+        if stated.space not in KINDS:
             raise BundleError(
-                f"the run's policy spec: 'action' must be one of {', '.join(KINDS)}, not "
+                f"the run's policy spec: 'action' must be one of {', '.join(SPACES)}, not "
                 f"{stated.action[:40]!a}"
             )
     if found := departures(run):

@@ -138,6 +138,7 @@ def model_data(entry: Entry) -> dict[str, object]:
         "mode": entry.mode,
         "split": entry.split,
         "suite": entry.suite,
+        "track": entry.track,
         "training": entry.training,
         "scenes": entry.scenes,
         "parameters": entry.parameters,

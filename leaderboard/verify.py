@@ -12,7 +12,7 @@ import hashlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
 from typing import Annotated
@@ -258,7 +258,7 @@ def _check_actions(
     """
 
     def check(found: Sequence[TrialRecord]) -> None:
-        space = rules.spec_of(run.manifest.settings, found[0].key.task).action
+        space = rules.spec_of(run.manifest.settings, found[0].key.task).space
         _check_variant(archive, found, traces, reference, space)
 
     pool = ThreadPoolExecutor(THREADS)
@@ -417,7 +417,8 @@ def results_of(name: str, outcomes: Mapping[str, object], run: RunManifest) -> M
         records |= {k: _record(k, category, part, place) for place, k in enumerate(own)}
     # What else the run says of itself is for its card: a column is shown as any other model's.
     told = RunManifest(categories=run.categories, suite=run.suite)
-    return results_of_records(name, sorted(run.keys), records, told)
+    found = results_of_records(name, sorted(run.keys), records, told)
+    return replace(found, setting=replace(found.setting, track=run.tracks))
 
 
 def _checked(data: object, count: int, where: str) -> Outcomes:

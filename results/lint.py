@@ -126,6 +126,7 @@ def lint_runs(runs: Sequence[Run]) -> list[Finding]:
         ("instruction splits", lambda r: sorted({k.split for k in r.keys})),
         ("step limits", lambda r: r.manifest.settings.step_scale),
         ("clocks", lambda r: r.manifest.clock),
+        ("tracks", lambda r: r.manifest.tracks),
     ):
         if len({repr(read(run)) for run in runs}) > 1:
             names = ", ".join(run.folder.name for run in runs)

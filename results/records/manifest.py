@@ -42,6 +42,12 @@ Facts = dict[str, object]
 """JSON values that are kept as they are: what a server, a world or a machine says of itself."""
 
 
+JOINTS = "joints"
+TRACKS = {"skill": "skills", "point": "points"}
+"""Actions that make a run one of a track of its own; JOINTS is that of all others. Tracks share
+scenes, sentences and goals; nothing is averaged, compared or ranked over two of them."""
+
+
 class RunError(Exception):
     """A run's folder cannot be read; the message names file and line."""
 
@@ -74,6 +80,11 @@ class PolicySpecification(Struct, frozen=True):
     privileged: bool = False
     environment_state: bool = False
     needs_trial_key: bool = False
+
+    @property
+    def space(self) -> str:
+        """The space of the recorded actions: skills are executed as joints."""
+        return "joint" if TRACKS.get(self.action) == "skills" else self.action
 
 
 class PolicySettings(Struct, frozen=True, dict=True):
@@ -248,6 +259,12 @@ class RunManifest(Struct, frozen=True, dict=True, kw_only=True):
     def policy(self) -> PolicySpecification:
         """What the (first) policy said of itself."""
         return self.settings.policy.stated
+
+    @property
+    def tracks(self) -> tuple[str, ...]:
+        """The track of its policies; several of a run that means nothing as a whole."""
+        acting = self.settings.policies.values() or (self.settings.policy,)
+        return tuple(sorted({TRACKS.get(one.stated.action, JOINTS) for one in acting}))
 
     @property
     def clock(self) -> str:

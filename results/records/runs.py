@@ -20,6 +20,7 @@ from pathlib import Path
 from msgspec import structs
 
 from robospa.results.records.manifest import (
+    JOINTS,
     OFFICIAL,
     RunError,
     RunManifest,
@@ -354,10 +355,12 @@ def setting_name(run: Run) -> str:
 
 
 def setting_parts(run: Run) -> tuple[str, ...]:
-    """The suite if it is no own one, robots, scene modes, splits and clock of `run`."""
+    """The suite if it is no own one, robots, scene modes, splits, clock and track of `run`, this if
+    it is not that of joints."""
     official = run.manifest.suite if run.manifest.suite.startswith(OFFICIAL) else ""
     values = [dict.fromkeys(getattr(key, part) for key in run.keys) for part in PARTS]
-    return (official, *map(", ".join, values), run.manifest.clock)
+    tracks = ", ".join(run.manifest.tracks)
+    return (official, *map(", ".join, values), run.manifest.clock, tracks * (tracks != JOINTS))
 
 
 def read_part(name: str) -> Run:

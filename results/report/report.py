@@ -17,6 +17,7 @@ from robospa.results.figures.series import FORMATS, DrawnFigure, Series
 from robospa.results.lint import lint_run, lint_runs
 from robospa.results.paper.columns import Column, check_columns, column_of, results_beside_runs
 from robospa.results.paper.origin import banner, origin_of
+from robospa.results.records.manifest import JOINTS
 from robospa.results.records.runs import Run, by_setting, finished
 from robospa.results.report.run_card import names_of
 from robospa.results.report.score_table import BESIDE, loss_lines, missing_lines
@@ -28,7 +29,8 @@ from robospa.results.report.tables import (
     report_tables,
     shared_variants,
 )
-from robospa.results.scoring.models import IncomparableError, ModelResults, results_of_run
+from robospa.results.scoring.models import IncomparableError, ModelResults, by_track, results_of_run
+from robospa.text import some
 from robospa.trial import TrialKey
 
 
@@ -97,9 +99,29 @@ def make_report(
 
 def _tables(own: Sequence[ModelResults], columns: Sequence[Column]) -> list[ReportTable]:
     """The paper's tables, after those of one policy's robots, scene modes or splits, of grounding
-    and execution, and of the trials that compare."""
-    if not columns:
-        return []
+    and execution, and of the trials that compare; of several tracks, one after the other."""
+    tracks = by_track([column.results for column in columns])
+    made = []
+    for track, members in tracks.items():
+        mine = [column for column in columns if column.results in members]
+        found = _track_tables([model for model in own if model in members], mine)
+        if len(tracks) > 1:
+            found = [
+                replace(
+                    one,
+                    table=replace(
+                        one.table,
+                        name=f"{track}-{one.table.name}",
+                        title=f"{one.table.title}, track {track}",
+                    ),
+                )
+                for one in found
+            ]
+        made += found
+    return made
+
+
+def _track_tables(own: Sequence[ModelResults], columns: Sequence[Column]) -> list[ReportTable]:
     axes = [table for metric in ("sr", "sr1") if (table := by_axis(own, metric))]
     beside = [table for made in BESIDE if (table := made(own))]
     ours = [ReportTable(table, False) for table in (*axes, *beside)]
@@ -110,12 +132,18 @@ def banners(models: Sequence[ModelResults]) -> list[str]:
     """What to know before `models` are compared."""
     found = []
     if others := [model.name for model in models if model.published]:
-        found.append(banner(others, [model for model in models if not model.published]))
+        found.append(banner(others, [one for one in by_track(models)[JOINTS] if not one.published]))
     if len(clocks := sorted({m.setting.clock for m in models if not m.published})) > 1:
         names = " and ".join(", ".join(clock) for clock in clocks)
         found.append(f"Latency comparison: the runs had the clocks {names}; none is ranked.")
-    if len(models) > 1 and not shared_variants(models):
+    tracks = by_track(models)
+    if any(len(alike) > 1 and not shared_variants(alike) for alike in tracks.values()):
         found.append("No variant has results of all: every mean is over variants of its own.")
+    if len(tracks) > 1:
+        found.append(
+            f"Tracks {some([*tracks])} are of one benchmark and have tables of their own: what one "
+            "answers in points or skills is never compared or ranked with what moves joints itself."
+        )
     return found
 
 
@@ -125,7 +153,8 @@ def columns_of(models: Sequence[ModelResults]) -> tuple[list[Column], list[str]]
         return [], []  # nothing has finished yet
     try:
         columns = [Column(m) if m.published else column_of(m) for m in models]
-        check_columns(columns)
+        for alike in by_track(models).values():
+            check_columns([column for column in columns if column.results in alike])
     except IncomparableError as error:
         if len(models) > 1:
             raise

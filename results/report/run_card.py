@@ -36,7 +36,7 @@ def names_of(runs: Sequence[Run]) -> list[str]:
     told = [", ".join(filter(None, compress(parts, differ))) for parts in settings]
     for extra in (told, [run.folder.name for run in runs]):
         names = [
-            f"{name} ({text})" if _differ(names, extra, name) else name
+            f"{name} ({text})" if text and _differ(names, extra, name) else name
             for name, text in zip(names, extra, strict=True)
         ]
     for place in range(len(names)):

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from robospa.results.paper.columns import Column, idle_column
 from robospa.results.paper.result_tables import summary_table, task_table
 from robospa.results.paper.tables import basic_table, write_tables
-from robospa.results.scoring.models import ModelResults, restricted
+from robospa.results.scoring.models import ModelResults, by_track, restricted
 from robospa.results.scoring.scores import Variant
 from robospa.results.tables import Table, html_fragment
 from robospa.trial import BASIC, METRIC_CATEGORIES, METRICS
@@ -37,11 +37,17 @@ def with_results(model: ModelResults) -> set[Variant]:
 
 
 def over_shared(models: Sequence[ModelResults]) -> list[ModelResults]:
-    """`models` as if each had run the shared variants only; as they are if there is one alone, or
-    if they share nothing. Runs in progress have only what they have results of."""
+    """`models` as if each had run the variants only that its track shares; as they are if there is
+    one alone, or if they share nothing. Runs in progress have only what they have results of."""
     begun = [restricted(m, with_results(m)) if m.to_run else m for m in models]
-    shared = shared_variants(models) if len(models) > 1 else set()
-    return [restricted(model, shared) for model in begun] if shared else begun
+    tracks = by_track(models)
+    shared = {t: shared_variants(found) for t, found in tracks.items() if len(found) > 1}
+    return [
+        restricted(model, variants)
+        if (variants := shared.get(", ".join(model.setting.track)))
+        else model
+        for model in begun
+    ]
 
 
 def beside_runs(published: ModelResults, runs: Sequence[ModelResults]) -> ModelResults:

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from robospa.results.records.manifest import OFFICIAL, REST_TO_REST, RunManifest
+from robospa.results.records.manifest import JOINTS, OFFICIAL, REST_TO_REST, TRACKS, RunManifest
 from robospa.results.records.runs import Run, finished
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.scores import Scores, Variant, score
@@ -14,10 +14,10 @@ from robospa.results.statistics.intervals import METHODS
 from robospa.results.statistics.samples import Sample
 from robospa.trial import BASIC, METRIC_CATEGORIES, METRIC_NAMES, RATES, TrialKey
 
-TABLE = ("embodiment", "mode", "suite", "split")
+TABLE = ("embodiment", "mode", "suite", "split", "track")
 COMPARISON = (*TABLE, "step_scale")
 """Parts of a setting that runs have to share in one table, and in one comparison."""
-BESIDE_PAPER = ("embodiment", "mode")
+BESIDE_PAPER = ("embodiment", "mode", "track")
 """Parts that a run has to share with published models, which are a suite of their own."""
 RAN_WITH = {
     "embodiment": "the embodiments {} and {}",
@@ -26,6 +26,7 @@ RAN_WITH = {
     "suite": "the suites {} and {}",
     "step_scale": "{:g} and {:g} times the official step limits",
     "clock": "the clocks {} and {}",
+    "track": "the tracks {} and {}",
 }
 """Words of messages for two different values of each part."""
 
@@ -48,11 +49,12 @@ class Setting:
     suite: tuple[str, ...] = ()
     step_scale: tuple[float, ...] = ()
     clock: tuple[str, ...] = ()
+    track: tuple[str, ...] = (JOINTS,)
 
     def mixed(self) -> list[tuple[str, tuple[str, ...]]]:
         """The parts that have several values, with these."""
-        parts = (("embodiment", self.embodiment), ("mode", self.mode), ("split", self.split))
-        return [(name, values) for name, values in parts if len(values) > 1]
+        parts = ("embodiment", "mode", "split", "track")
+        return [(name, values) for name in parts if len(values := getattr(self, name)) > 1]
 
 
 PAUSED = "paused"
@@ -68,6 +70,7 @@ def setting_of(keys: Sequence[TrialKey], manifest: RunManifest) -> Setting:
         (manifest.suite,) if manifest.suite else (),
         (manifest.settings.step_scale,),
         (manifest.clock or PAUSED,),
+        manifest.tracks,
     )
 
 
@@ -176,6 +179,14 @@ def one_policy(models: Sequence[ModelResults]) -> bool:
     """Whether all are runs of one policy."""
     names = {model.manifest.policy.name for model in models}
     return len(names) == 1 and "" not in names and not any(model.published for model in models)
+
+
+def by_track(models: Sequence[ModelResults]) -> dict[str, list[ModelResults]]:
+    """`models` by track, in their order; each track stands for itself."""
+    made: dict[str, list[ModelResults]] = {track: [] for track in (JOINTS, *TRACKS.values())}
+    for model in models:
+        made.setdefault(", ".join(model.setting.track), []).append(model)
+    return {track: found for track, found in made.items() if found}
 
 
 def suite_of(results: ModelResults) -> str:

@@ -80,6 +80,23 @@ def test_one_other_part_is_another_group(part: str) -> None:
     assert replace(one, **{part: "another"}) != one
 
 
+def test_skills_are_ranked_among_themselves_and_paired_with_no_joints(entries: list[Entry]) -> None:
+    def said_to_be(entry: Entry, track: str) -> Entry:
+        results = entry.column.results
+        setting = replace(results.setting, track=(track,))
+        return replace(
+            entry, column=replace(entry.column, results=replace(results, setting=setting))
+        )
+
+    first, second = (entry for entry in entries[4:7:2])
+    skills = said_to_be(second, "skills")
+    assert group(first) == group(second) != group(skills) and ranks(skills)
+    shown = [model_data(one)["group"] for one in (first, skills)]
+    assert shown[1] == f"{shown[0]}, skills"
+    found = group(skills)
+    assert found and found.title.startswith("Track of skills, robospa-1")
+
+
 def test_nobody_is_ranked_in_a_suite_that_still_changes(entries: list[Entry]) -> None:
     draft = replace(entries[-1], suite="robospa-3-draft")
     found = group(draft)

@@ -8,15 +8,28 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bundle_fakes import PRESS, REFERENCE, Files, put_rows, rows_of, seal, success_event, zip_up
+from bundle_fakes import (
+    CARD,
+    PRESS,
+    REFERENCE,
+    Files,
+    all_keys,
+    make_run,
+    put_rows,
+    rows_of,
+    seal,
+    success_event,
+    zip_up,
+)
 from msgspec import structs
 
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.evidence import sample_size
+from robospa.leaderboard.packing import pack
 from robospa.leaderboard.replay import SampleReplay, judge, replay
 from robospa.leaderboard.rules import Reference, manifest_of
-from robospa.leaderboard.verify import outcomes_of, scores_of, verify
+from robospa.leaderboard.verify import outcomes_of, results_of, scores_of, verify
 from robospa.results.records.runs import Run, from_data
 
 CHALLENGE = "a value nobody knew"
@@ -145,3 +158,31 @@ def test_actions_of_another_task_forged_with_all_hashes_are_caught(
     made = replayed(zip_up(tmp_path / "b.zip", seal(files)), 40)
     assert not made.evidence.holds
     assert {t.key.variant for t in made.trials if t.kind == "different"} == {(PRESS, 1)}
+
+
+def in_track(folder: Path, action: str) -> Path:
+    """A bundle whose policy says that it answers in `action`s, which were executed as joints."""
+
+    def change(settings: dict[str, Any], about: dict[str, Any]) -> None:
+        settings["policy"]["spec"] |= {"action": action, "horizon": None, "execute": None}
+
+    run = make_run(folder / "run", all_keys(), change=change)
+    card = structs.replace(CARD, actions=structs.replace(CARD.actions, space=action))
+    pack([run], card, folder / "bundle.zip", REFERENCE)
+    return folder / "bundle.zip"
+
+
+def test_skills_are_verified_and_replayed_as_the_joints_they_became(tmp_path: Path) -> None:
+    path = in_track(tmp_path, "skill")
+    made = replayed(path, 10)
+    assert made.evidence.holds and made.evidence.exact
+    valid = verify(path, REFERENCE)
+    kept = results_of("it", outcomes_of(valid.run), valid.run.manifest)
+    assert kept.setting.track == ("skills",)
+
+
+def test_points_move_nothing_and_enter_no_board(tmp_path: Path) -> None:
+    with pytest.raises(
+        BundleError, match="'action' must be one of joint, ee, delta_ee, skill, not"
+    ):
+        in_track(tmp_path, "point")

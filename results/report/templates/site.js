@@ -241,7 +241,7 @@ function pairOf(a, b) {
     return !v || !turned ? v : [-v[0], -v[2], -v[1], v[4], v[3], v[5]];
   } };
 }
-const PARTS = { suite: "suite", embodiment: "embodiment", mode: "scenes", split: "instructions" };
+const PARTS = { suite: "suite", embodiment: "embodiment", mode: "scenes", split: "instructions", track: "track" };
 // What differs between two models of different groups, in a sentence or two.
 function differing(a, b) {
   const parts = Object.keys(PARTS).filter((p) => !a[p] || a[p] !== b[p]);
@@ -289,7 +289,7 @@ function choices(name, texts) {
   fill(filters.elements[name], [["", "all"], ...values.map((v) => [v, texts?.[v] ?? v])]);
   filters.elements[name].parentElement.hidden = values.length < 2;
 }
-for (const name of ["embodiment", "mode", "suite", "scenes"]) choices(name);
+for (const name of ["embodiment", "mode", "suite", "scenes", "track"]) choices(name);
 choices("training", data.training);
 const carried = Object.keys(data.badges).filter((b) => data.models.some((m) => m.badges.includes(b)));
 fill(filters.elements.badge, [["", "all"], ...carried.map((b) => [b, data.badges[b]])]);

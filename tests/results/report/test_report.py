@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from fake_runs import EVIL, KNOWN, RECORDS, make_run, shown
 
+from robospa.results.comparison.compare import compare_results
 from robospa.results.paper.published import load
 from robospa.results.records.runs import film_name, read_run
 from robospa.results.records.trial_record import EventRow
@@ -18,7 +19,7 @@ from robospa.results.report import score_table as tables
 from robospa.results.report.page import write_report
 from robospa.results.report.report import make_report
 from robospa.results.report.trials import event_row
-from robospa.results.scoring.models import results_of_run
+from robospa.results.scoring.models import IncomparableError, results_of_run
 from robospa.results.statistics.intervals import Estimate, wilson
 
 pytestmark = pytest.mark.usefixtures("same_figures_once")
@@ -272,3 +273,27 @@ def test_both_splits_of_a_run_have_a_column_beside_the_paper(tmp_path: Path) -> 
     names = [name.rpartition("(")[2] for name, _ in table.groups]
     assert names == ["train)", "heldout)", "paper)"]
     assert "(train: comparable)" in report.banner[0] and "(heldout: stricter)" in report.banner[0]
+
+
+def test_each_track_has_tables_of_its_own_and_none_is_compared(tmp_path: Path) -> None:
+    runs = [
+        make_run(
+            tmp_path / action,
+            [shown("Pick_Blocks_Size", level, n, n < good) for level in (1, 2) for n in range(8)],
+            settings={"policy": {"spec": {"name": "model", "action": action}}},
+        )
+        for action, good in (("skill", 6), ("joint", 2), ("point", 7))
+    ]
+    report = make_report(runs)
+    assert [run.manifest.tracks for run in runs] == [("skills",), ("joints",), ("points",)]
+    names = [model.name for model in report.models]
+    assert names == ["model (skills)", "model", "model (points)"]
+    titles = [one.table.title for one in report.tables]
+    assert [t for t in titles if t.endswith("track skills")] and len(titles) % 3 == 0
+    marked = [e.best for one in report.tables for row in one.table.rows for e in row.cells]
+    assert not any(marked)
+    assert "never compared" in " ".join(report.banner)
+    sides = [results_of_run(run) for run in runs[:2]]
+    with pytest.raises(IncomparableError, match="they ran with the tracks skills and joints"):
+        compare_results(*sides)
+    assert (write_report(report, tmp_path / "out") / "report.html").is_file()
