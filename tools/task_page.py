@@ -43,8 +43,7 @@ or kinds of things to handle, *T* subtasks (spatial and basic tasks: 1), *limit*
 
 Percentages are SR/SR@1, of procedures SR/SR@1/PS, of [policies that read no
 sentence](policies.md#floors) at levels 1, 3 and 5, and of [the learned reference](learned.md)
-({extents}; floors of CVR and EPG are of
-robospa-2's layouts); *doing nothing* is its PS. The expert has 100 everywhere{but}. Where a policy
+({extents}); *doing nothing* is its PS. The expert has 100 everywhere{but}. Where a policy
 that reads none has 100, [the rule asks for none](fidelity.md#what-the-official-rule-allows).
 """
 
