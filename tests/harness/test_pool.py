@@ -188,7 +188,7 @@ from fake_runs import trial_record
 from film_fakes import KEYS
 replay.drawn = lambda *_: KEYS[:1]
 replay.read_traces = lambda *_: {KEYS[0]: ()}
-replay.spec_of = lambda *_: SimpleNamespace(action="joint")
+replay.spec_of = lambda *_: SimpleNamespace(space="joint")
 valid = SimpleNamespace(
     manifest=SimpleNamespace(bundle="b"), keys=KEYS, settings=None,
     run=SimpleNamespace(records={KEYS[0]: trial_record(KEYS[0])}))
