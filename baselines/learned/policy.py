@@ -92,8 +92,8 @@ class Learned:
 
     def _begin(self, belief: Belief, observation: Observation) -> None:
         """Decide what is next; nothing if all is done."""
-        if self._tries == 0:
-            self._steps = self._chain(belief.state)
+        if self._tries == 0 or not all(possible(step, belief.state) for step in self._steps):
+            self._tries, self._steps = 0, self._chain(belief.state)  # what it was about is gone
         calls = calls_of(self._steps, belief.state)
         if not calls:
             return
