@@ -17,15 +17,19 @@ import json
 import sys
 import time
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from collections.abc import Callable
+from concurrent.futures import as_completed
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from rich.progress import track
 
+from robospa.harness.pool import JobProcess, Pool
 from robospa.tasks import catalog
 
+Job = tuple[str, int, int, str]
+"""Task, level, number of scenes and scene mode."""
 FIRST_SEED = 10_000_000
 """Seeds that nothing was ever tuned on."""
 SHOWN = 5
@@ -68,6 +72,11 @@ def look(name: str, level: int, scenes: int, mode: str) -> dict[str, Any]:
     }
 
 
+def looker(_: None) -> Callable[[Job], dict[str, Any]]:
+    """`look` in a process of its own."""
+    return lambda job: look(*job)
+
+
 def off(counts: dict[str, int]) -> float:
     """Largest deviation of a value's frequency from an even share, relative to that share."""
     even = sum(counts.values()) / len(counts)
@@ -98,9 +107,12 @@ def main() -> int:
     }
     wanted = chosen(arguments.tasks, arguments.levels)
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
-    with ProcessPoolExecutor(arguments.workers, mp_context=get_context("spawn")) as pool:
+    from check_scenes import looker  # by the name that its process finds it by
+
+    start = partial(JobProcess, looker, None, name="scenes")
+    with Pool[Job, dict[str, Any]](start, arguments.workers) as pool:
         jobs = [
-            pool.submit(look, *v, arguments.scenes, arguments.mode) for v in wanted if v not in rows
+            pool.submit((*v, arguments.scenes, arguments.mode)) for v in wanted if v not in rows
         ]
         for job in track(as_completed(jobs), total=len(jobs), description="variants"):
             row = job.result()
