@@ -17,6 +17,8 @@ from importlib.resources import files
 from pathlib import Path
 from statistics import NormalDist
 
+from msgspec.json import encode
+
 from robospa.harness.running.atomic_file import replace_file
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.agreement import CELL_LIE
@@ -41,6 +43,7 @@ from robospa.results.paper.published import load
 from robospa.results.report.page import FIGURES, card, figure, own_version, render
 from robospa.results.report.tables import ReportTable, for_page, method_notes, report_tables
 from robospa.results.report.trials import put
+from robospa.results.scoring.grounding import Grounding, table_of
 from robospa.results.scoring.models import ModelResults
 from robospa.trial import CATEGORIES, CATEGORY_NAMES, DIMENSIONS, METRIC_NAMES
 
@@ -229,7 +232,13 @@ def _partial(entry: Entry) -> str:
 def _tables(entry: Entry) -> list[ReportTable]:
     """The report's tables; those of all tasks are opened by hand."""
     shown = report_tables([entry.column])
+    if table := table_of([(entry.name, {(row, 0): one for row, one in _chosen(entry).items()})]):
+        shown.append(ReportTable(table, False))
     return [replace(table, folded=table.table.name.endswith("-tasks")) for table in shown]
+
+
+def _chosen(entry: Entry) -> Mapping[str, Grounding]:
+    return entry.submission.grounding if entry.submission else {}
 
 
 def failure_rows(failures: Mapping[str, Mapping[str, int]]) -> list[dict[str, object]]:
@@ -245,14 +254,16 @@ def failure_rows(failures: Mapping[str, Mapping[str, int]]) -> list[dict[str, ob
 
 def _figures(entry: Entry, folder: Path) -> list[DrawnFigure]:
     """Draw the entry's figures, unless the folder holds those of the same values already."""
-    values = [page_values(entry), entry.failures, entry.name, own_version()]
-    state = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
+    values = [page_values(entry), entry.failures, _chosen(entry), entry.name, own_version()]
+    state = hashlib.sha256(encode(values, order="deterministic")).hexdigest()
     kept = folder / "drawn.json"
     if kept.exists():
         known = json.loads(kept.read_text(encoding="utf-8"))
         if known["state"] == state:
             return [DrawnFigure(**one) for one in known["drawings"]]
-    series = Series(entry.name, entry.column.scores, failures=entry.failures)
+    series = Series(
+        entry.name, entry.column.scores, failures=entry.failures, grounding=_chosen(entry)
+    )
     made = draw([series], folder, FORMATS)
     found = {"state": state, "drawings": [asdict(drawing) for drawing in made]}
     replace_file(kept, json.dumps(found).encode())

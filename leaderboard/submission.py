@@ -21,7 +21,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -47,6 +47,7 @@ from robospa.results.records.manifest import RunManifest
 from robospa.results.records.runs import Run
 from robospa.results.report.run_card import END_NAMES
 from robospa.results.report.trials import trial_rows
+from robospa.results.scoring.grounding import ROWS, Grounding, groundings
 from robospa.schema import Count, one_of, pattern, read
 
 MOST = 8 * layout.MEGA
@@ -126,6 +127,7 @@ class Submission:
     evidence: BadgeEvidence
     failures: Mapping[str, Mapping[str, int]]
     films: Sequence[Mapping[str, object]]
+    grounding: Mapping[str, Grounding]
 
 
 @dataclass(frozen=True)
@@ -168,10 +170,12 @@ class FilmedTrial(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class TrialsFile(Struct, frozen=True):
-    """`trials.json`: how often each failure type was seen, by task, and the filmed trials."""
+    """`trials.json`: how often each failure type was seen, by task, the filmed trials, and what was
+    chosen, by category and dimension; none of a submission of an older version."""
 
     failures: dict[str, dict[Annotated[str, one_of(NAMES)], Count]]
     films: list[FilmedTrial]
+    grounding: dict[Annotated[str, one_of(ROWS)], Grounding] = {}
 
 
 def slug_of(name: str) -> str:
@@ -217,7 +221,12 @@ def add(
             replace_file(folder / record.video, archive.read(record.video))
     shown = Run(folder, valid.run.manifest, tuple(filmed), filmed)
     rows = trial_rows([shown], folder, [failures_of(filmed.values())])
-    trials = {"failures": distribution(valid.run.records.values()), "films": rows}
+    chosen = groundings(valid.run.records.values()).items()
+    trials = {
+        "failures": distribution(valid.run.records.values()),
+        "films": rows,
+        "grounding": {row: asdict(one) for (row, n), one in chosen if not n and row in ROWS},
+    }
     for name, content in ((TRIALS, trials), (EVIDENCE, evidence)):
         replace_file(folder / name, (json.dumps(content, indent=1) + "\n").encode())
     return folder
@@ -309,7 +318,7 @@ def read_submission(folder: Path) -> Submission:
     if evidence.address == IN_REPOSITORY:
         check_weights(card, where)
         check_contents(folder, manifest, where)
-    failures, films = _read_trials(parts[TRIALS], folder, where)
+    trials, films = _read_trials(parts[TRIALS], folder, where)
     return Submission(
         folder=folder,
         bundle=manifest.bundle,
@@ -318,8 +327,9 @@ def read_submission(folder: Path) -> Submission:
         scores=parts["scores.json"],
         outcomes=parts["outcomes.json"],
         evidence=evidence,
-        failures=failures,
+        failures=trials.failures,
         films=films,
+        grounding=trials.grounding,
     )
 
 
@@ -334,8 +344,8 @@ def _bytes(path: Path, where: str) -> bytes:
 
 def _read_trials(
     data: Mapping[str, object], folder: Path, where: str
-) -> tuple[Mapping[str, Mapping[str, int]], list[dict[str, object]]]:
-    """Failure counts and rows of filmed trials; BundleError unless the videos are there."""
+) -> tuple[TrialsFile, list[dict[str, object]]]:
+    """The file, and rows of filmed trials for the page; BundleError unless the videos are there."""
     trials = read(TrialsFile, data, f"{where}, {TRIALS}", BundleError)
     for film in trials.films:
         path = folder / film.video
@@ -343,4 +353,4 @@ def _read_trials(
             raise BundleError(f"{where}: {film.video} is missing or no plain file")
     rows = data["films"]
     assert isinstance(rows, list)
-    return trials.failures, [{**row, "run": 0} for row in rows]
+    return trials, [{**row, "run": 0} for row in rows]

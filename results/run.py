@@ -58,8 +58,8 @@ class LoadedRun(Run):
         return comparable(results_of_run(self, ci=ci)).scores
 
     def grounding(self) -> dict[Place, Grounding]:
-        """What was chosen and what came of it, by task, category, dimension or "overall", and level
-        (0: all): `run.grounding()["GAC", 0].execution` (`docs/statistics.md`)."""
+        """What was chosen and what came of it, by task, category or dimension, and level (0:
+        all): `run.grounding()["GAC", 0].execution` (`docs/statistics.md`)."""
         return groundings(r for r in self.records.values() if finished(r))
 
     def failures(self) -> FailedTrials:

@@ -20,6 +20,7 @@ from robospa.results.figures.series import (
     whiskers,
 )
 from robospa.results.scoring.scores import Scores
+from robospa.results.statistics.intervals import Estimate
 from robospa.trial import CATEGORY_NAMES, PROCEDURAL, SPATIAL
 
 if TYPE_CHECKING:
@@ -215,6 +216,41 @@ def _categories(axis: Axes, of_line: list[str]) -> None:
                 fontsize=6,
             )
             start = line
+
+
+BAR_FILLS = ((COLOURS[0], ""), (COLOURS[4], "////"), (COLOURS[6], "...."), (COLOURS[2], "xxxx"))
+"""Colour and hatching of the bars of a category."""
+
+
+def draw_bars(bars: Mapping[str, Mapping[str, Estimate]], label: str) -> Figure:
+    """The figure of `bars` (name -> category -> estimate), side by side in each category, with
+    intervals; one that is not known is left out."""
+    from matplotlib.patches import Patch
+
+    known = [c for c in CATEGORY_NAMES if any(c in values for values in bars.values())]
+    figure = new_figure(1.9)
+    axis = figure.subplots()
+    wide = 0.84 / len(bars)
+    handles, lowest = [], 0.0
+    for number, (name, values) in enumerate(bars.items()):
+        colour, hatch = BAR_FILLS[number % len(BAR_FILLS)]
+        handles.append(Patch(fc=colour, hatch=hatch, ec="#ffffff", lw=0.3, label=label_of(name)))
+        for place, category in enumerate(known):
+            if (found := values.get(category)) is not None:
+                at = place + (number - (len(bars) - 1) / 2) * wide
+                value, low, high = (100 * x for x in (found.value, found.low, found.high))
+                axis.bar(at, value, wide, color=colour, hatch=hatch, edgecolor="#ffffff", lw=0.3)
+                axis.plot([at, at], [low, high], color=INK, lw=0.6)
+                lowest = min(lowest, low)
+    axis.set_xticks(range(len(known)), known, fontsize=6)
+    axis.set_xlim(-0.55, len(known) - 0.45)
+    axis.set_ylim(lowest and max(-40.0, lowest - 2), 102)
+    axis.axhline(0, color=INK, lw=0.6)
+    axis.set_ylabel(label)
+    plain(axis)
+    axis.tick_params(axis="x", length=0)
+    legend_below(figure, handles)
+    return figure
 
 
 FAILURE_LINE = 0.13

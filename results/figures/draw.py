@@ -7,6 +7,7 @@ from pathlib import Path
 
 from robospa.results.failures.labels import KINDS, NAMES
 from robospa.results.figures.charts import (
+    draw_bars,
     draw_failures,
     draw_heat,
     draw_latency,
@@ -22,14 +23,25 @@ from robospa.results.figures.series import (
     save,
     styled,
 )
+from robospa.results.records.manifest import JOINTS, TRACKS
+from robospa.results.scoring.grounding import MEASURES
+from robospa.results.scoring.scores import Scores
+from robospa.results.statistics.intervals import Estimate
 
 CAPTIONS = {
     "success": "Success rate by level for every category, with 95 % intervals; "
     "thin dashes are SR@1, what the first choices alone reach, dots guessing among the candidates.",
     "progress": "Progress score against success rate, a point a procedural variant: the higher "
     "above the line, the further failed trials came.",
+    "grounding": "How many choices were right (0 is guessing in spatial and basic tasks), how many "
+    "right ones were carried out, and for how many steps nothing was chosen.",
+    "tracks": "Success at the first choice: a pixel pointed at, skills called at pixels, joints "
+    "moved. From points to skills to joints more is asked of the hand, in the same scenes.",
     "latency": "Share of trials whose median, 95th and 99th percentile latency lies below a value.",
 }
+
+
+TRACK_ORDER = (JOINTS, *TRACKS.values())
 
 
 def draw(
@@ -44,9 +56,11 @@ def draw(
     all of them have, for the figures that hold one against another.
     """
     made: list[DrawnFigure] = []
-    together = beside or all_series
+    tracks = {track: [s for s in all_series if s.track == track] for track in TRACK_ORDER}
+    compared = next((found for found in tracks.values() if found), [])
+    together = [s for s in beside or all_series if s.track == compared[0].track] if compared else []
     sizes = [len(s.scores.cells) for s in together]
-    cut = sizes != [len(s.scores.cells) for s in all_series]
+    cut = sizes != [len(s.scores.cells) for s in compared]
     over = f" Over the {sizes[0]} variants that all have." if cut else ""
     runs = [s for s in all_series if has_latency(s)]
     mapped = [s for s in all_series if not s.published] or all_series
@@ -59,6 +73,12 @@ def draw(
             made.append(
                 DrawnFigure("progress", "Progress against success", CAPTIONS["progress"] + over)
             )
+        if sum(map(bool, tracks.values())) > 1:
+            bars = {
+                f"{t}: {s.name}": _rates(s.scores) for t in reversed(TRACK_ORDER) for s in tracks[t]
+            }
+            save(draw_bars(bars, "SR@1 [%]"), folder, "tracks", formats)
+            made.append(DrawnFigure("tracks", "Points, skills and joints", CAPTIONS["tracks"]))
         if runs:
             save(draw_latency(runs), folder, "latency", formats)
             made.append(DrawnFigure("latency", "Latency", CAPTIONS["latency"]))
@@ -69,6 +89,11 @@ def draw(
     return made
 
 
+def _rates(scores: Scores) -> dict[str, Estimate]:
+    """SR@1 of every category over its levels."""
+    return {c: e for (c, n), a in scores.categories.items() if not n and (e := a.values.get("sr1"))}
+
+
 def _own_figures(
     series: Series, number: int, mapped: bool, folder: Path, formats: Sequence[str]
 ) -> list[DrawnFigure]:
@@ -76,6 +101,14 @@ def _own_figures(
     ending = f"-{number}" if number else ""
     of = f": {series.name}" if number else ""
     found = series.failures
+    if any(one.chosen for one in series.grounding.values()):
+        bars = {
+            head: {c: e for c, one in series.grounding.items() if (e := getattr(one, measure))}
+            for measure, head in MEASURES.items()
+        }
+        name = f"grounding{ending}"
+        save(draw_bars(bars, "share [%]"), folder, name, formats)
+        made.append(DrawnFigure(name, f"Grounding and execution{of}", CAPTIONS["grounding"]))
     counts = {
         t: found[t] for t in series.scores.tasks_by_category if any(found.get(t, {}).values())
     }

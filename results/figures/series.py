@@ -12,7 +12,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypedDict
 
+from robospa.results.records.manifest import JOINTS
 from robospa.results.records.trial_record import TrialRecord
+from robospa.results.scoring.grounding import Grounding
 from robospa.results.scoring.scores import AverageScore, Scores, VariantScore
 from robospa.results.statistics.intervals import Estimate
 
@@ -52,6 +54,9 @@ class Series:
     published: bool = False
     failures: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     """How often each type of failure occurs, by task."""
+    grounding: Mapping[str, Grounding] = field(default_factory=dict)
+    """What was chosen and what came of it, by category."""
+    track: str = JOINTS
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,7 @@ from robospa.results.report.tables import (
     report_tables,
     shared_variants,
 )
+from robospa.results.scoring.grounding import ROWS, groundings
 from robospa.results.scoring.models import IncomparableError, ModelResults, by_track, results_of_run
 from robospa.text import some
 from robospa.trial import TrialKey
@@ -182,7 +183,9 @@ def draw_figures(
         name = column.title
         name += f" ({len(run.missing)} of {len(run.keys)} missing)" * bool(run.missing)
         by_task = distribution(records, failures=known)
-        series.append(Series(name, column.scores, records, failures=by_task))
+        chosen = {c: one for (c, n), one in groundings(records).items() if not n and c in ROWS}
+        track = ", ".join(column.results.setting.track)
+        series.append(Series(name, column.scores, records, False, by_task, chosen, track))
     beside = [replace(s, scores=m.scores) for s, m in zip(series, together, strict=True)]
     return draw(series, folder, formats, beside) if series else []
 

@@ -8,14 +8,12 @@ turn. So of a spatial category SR@1 is the share of trials with a choice, times 
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from typing import NamedTuple
 
 from robospa.results.failures.attribution import LATE, MEMORY, ORDERED, roles_of
-from robospa.results.paper.rounding import OVERALL
 from robospa.results.records.trial_record import EventRow, TrialRecord
 from robospa.results.scoring.first_choice import ANY_ORDER, first_choice, held_at_start, in_passing
 from robospa.results.scoring.models import ModelResults, restricted
@@ -218,17 +216,16 @@ def summed(tallies: Sequence[Tally]) -> Grounding:
 
 
 Place = tuple[str, int]
-"""A category, a task, a dimension or OVERALL, and a level, 0 for all."""
+"""A task, a category or a dimension, and a level, 0 for all."""
 
 
 def groundings(records: Iterable[TrialRecord]) -> dict[Place, Grounding]:
-    """The choices of every task, category and dimension, and of all, by level."""
+    """The choices of every task, category and dimension by level."""
     members: dict[Place, list[Tally]] = {}
     for record in records:
         tally = tally_of(record)
         names = [record.key.task, record.category]
         names += [d for d, categories in DIMENSIONS.items() if record.category in categories]
-        names += [OVERALL] * (record.category in CATEGORIES)
         for place in ((name, level) for name in names for level in (record.key.level, 0)):
             members.setdefault(place, []).append(tally)
     return {place: summed(found) for place, found in members.items()}
@@ -255,7 +252,7 @@ def grounding_data(records: Iterable[TrialRecord]) -> dict[str, dict[str, dict[s
 
 
 ROWS = {c: f"{c} {CATEGORY_NAMES[c]}" for c in CATEGORIES}
-ROWS |= {**{d: f"{d} categories" for d in DIMENSIONS}, OVERALL: OVERALL}
+ROWS |= {d: f"{d} categories" for d in DIMENSIONS}
 ROWS |= {c: f"{c} {CATEGORY_NAMES[c]}" for c in BASIC}
 NOTE = (
     "In percent with 95 % intervals, over all choices of all levels. Grounding: how many choices "
@@ -266,7 +263,11 @@ NOTE = (
 
 def grounding_table(models: Sequence[ModelResults]) -> Table | None:
     """Grounding and execution of runs by category; None where nothing is known to be chosen."""
-    sides = [(m.name, groundings(records_of(m))) for m in models if m.trials]
+    return table_of([(m.name, groundings(records_of(m))) for m in models if m.trials])
+
+
+def table_of(sides: Sequence[tuple[str, Mapping[Place, Grounding]]]) -> Table | None:
+    """The same of what was found for each name."""
     if not any(one.chosen for _, found in sides for one in found.values()):
         return None
     heads = (*MEASURES.values(), "choices")
@@ -281,7 +282,8 @@ def grounding_table(models: Sequence[ModelResults]) -> Table | None:
     ]
     groups = tuple((name, len(heads)) for name, _ in sides)
     title = "Grounding and execution"
-    return Table("grounding", title, "", heads * len(sides), tuple(rows), groups, (NOTE,))
+    notes = (NOTE, *chain(*(finding(*side) for side in sides)))
+    return Table("grounding", title, "", heads * len(sides), tuple(rows), groups, notes)
 
 
 def _cells(found: Grounding | None) -> list[TableCell]:
@@ -297,7 +299,7 @@ def differences(first: ModelResults, second: ModelResults) -> tuple[str, ...]:
     shared = first.trials.keys() & second.trials.keys()
     sides = [groundings(records_of(restricted(model, shared))) for model in (first, second)]
     said = []
-    for place in ((name, 0) for name in (*DIMENSIONS, OVERALL, *BASIC)):
+    for place in ((name, 0) for name in (*DIMENSIONS, *BASIC)):
         if all(place in side for side in sides):
             one, two = (side[place] for side in sides)
             texts = [
@@ -309,21 +311,16 @@ def differences(first: ModelResults, second: ModelResults) -> tuple[str, ...]:
     return tuple(said)
 
 
-def finding(name: str, found: Mapping[Place, Grounding]) -> str:
-    """Where the right object was chosen and not handled, and where it was not chosen: a sentence
-    with numbers; "" without choices."""
-    whole = found.get((OVERALL, 0))
-    if whole is None or not whole.chosen or whole.accuracy is None:
-        return ""
-    lost = Counter(
-        {
-            "nothing was chosen": max(0, whole.due - whole.chosen),
-            "the choice was wrong": whole.chosen - whole.right,
-            "the right choice was not carried out": whole.right - whole.done,
-        }
-    )
-    words = ", ".join(f"{why} {n}" for why, n in lost.most_common())
-    known = f"{whole.right} of {whole.chosen} choices were right"
-    if whole.execution is not None:
-        known += f" and {whole.done} of these were carried out"
-    return f"{name}: {known}. Of what was lost: {words}."
+def finding(name: str, found: Mapping[Place, Grounding]) -> list[str]:
+    """A sentence for each dimension: how many choices were right and carried out, and of how many
+    steps nothing was chosen."""
+    said = []
+    for dimension in DIMENSIONS:
+        one = found.get((dimension, 0))
+        if one is not None and one.chosen:
+            none = round(one.due * one.no_choice.value) if one.no_choice else 0
+            said.append(
+                f"{name}, {dimension}: {one.right} of {one.chosen} choices were right, of these "
+                f"{one.done} were carried out; for {none} of {one.due} steps nothing was chosen."
+            )
+    return said

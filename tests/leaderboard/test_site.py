@@ -71,6 +71,8 @@ def test_a_submission_has_its_badges_and_their_evidence(kept: Path, tmp_path: Pa
                  "https://example.org/bundle.zip", "Filmed trials", "50, 50, 50",
                  "ran 1 of 56 tasks"):  # fmt: skip
         assert text in page
+    found = read_submission(kept).grounding["GAC"]
+    assert found.trials == 20 and found.due == 20
     assert len(data_of(page)["trials"]) == 1
     film = tmp_path / "out" / "models" / "fake-1" / data_of(page)["trials"][0]["video"]
     assert film.is_file()

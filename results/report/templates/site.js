@@ -78,7 +78,7 @@ let columns = [];
 function chosen() {
   const want = Object.fromEntries(new FormData(filters));
   const terms = want.text.toLowerCase().split(/\s+/).filter(Boolean);
-  return data.models.filter((m) => ["embodiment", "mode", "suite", "training", "scenes"].every((n) => !want[n] || m[n] === want[n]) &&
+  return data.models.filter((m) => ["embodiment", "mode", "suite", "track", "training", "scenes"].every((n) => !want[n] || m[n] === want[n]) &&
     (!want.badge || m.badges.includes(want.badge)) &&
     terms.every((t) => (m.name + "\n" + m.team).toLowerCase().includes(t)));
 }

@@ -296,4 +296,5 @@ def test_each_track_has_tables_of_its_own_and_none_is_compared(tmp_path: Path) -
     sides = [results_of_run(run) for run in runs[:2]]
     with pytest.raises(IncomparableError, match="they ran with the tracks skills and joints"):
         compare_results(*sides)
-    assert (write_report(report, tmp_path / "out") / "report.html").is_file()
+    page = (write_report(report, tmp_path / "out") / "report.html").read_text()
+    assert "Points, skills and joints" in page and 'id="tracks-' in page

@@ -14,7 +14,6 @@ from robospa.results.run import load_run
 from robospa.results.scoring.first_choice import first_choice
 from robospa.results.scoring.grounding import (
     choices_of,
-    finding,
     grounding_table,
     summed,
     tally_of,
@@ -153,11 +152,10 @@ def test_a_run_has_them_as_a_table_and_by_level(tmp_path: Any) -> None:
     rng = random.Random(2)
     run = make_run(tmp_path / "run", [spatial("GAC", rng, seed) for seed in range(20)])
     loaded = load_run(run.folder)
-    whole = loaded.grounding()["overall", 0]
+    whole = loaded.grounding()["spatial", 0]
     assert loaded.grounding()["GAC", 3] == whole and whole.chosen == 20
     table = grounding_table([results_of_run(loaded)])
-    assert table and [row.label[:3] for row in table.rows] == ["GAC", "spa", "ove"]
+    assert table and [row.label[:3] for row in table.rows] == ["GAC", "spa"]
     assert table.rows[0].cells[-1].text == "20"
-    assert finding("it", loaded.grounding()).startswith(
-        f"it: {whole.right} of 20 choices were right"
-    )
+    said = f"spatial: {whole.right} of 20 choices were right, of these {whole.done} were"
+    assert said in table.notes[1] and "for 0 of 20 steps nothing" in table.notes[1]
