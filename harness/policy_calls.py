@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ParamSpec, Protocol, TypeVar, runtime_checkabl
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.protocol.policy import Policy, PolicySpec
+from robospa.protocol.policy import USAGE, Policy, PolicySpec
 
 if TYPE_CHECKING:
     from robospa.harness.trial import TrialState
@@ -109,8 +109,16 @@ class PolicyCaller:
         observation = run.observation(spec)
         if committed is not None:
             observation["committed"], observation["delay"] = committed.actions, committed.delay
-        answer = run.stopwatch.ask(self.policy, self.policy.infer, observation)
+        try:
+            answer = run.stopwatch.ask(self.policy, self.policy.infer, observation)
+        finally:
+            self.server_timings.append(getattr(self.policy, "last_timing", {}))
         self.asked.append(observation["step"])
         self.latencies.append(1000.0 * run.stopwatch.last_call)
-        self.server_timings.append(getattr(self.policy, "last_timing", {}))
         return run.checked(answer, spec)
+
+    def usage(self) -> dict[str, object]:
+        """What a record keeps of what the trial has used, as its policy says after each answer."""
+        last = self.server_timings[-1] if self.server_timings else {}
+        found = {name: last[name] for name in USAGE if name in last and 0 <= last[name] < 1e15}
+        return {"usage": found} if found else {}

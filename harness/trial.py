@@ -374,10 +374,10 @@ def run_trial(
         "physics": run.physics_seconds,
         PROCESSOR: processor() - busy,
     }
-    if real is not None:
-        record = replace(record, diagnostics={**record.diagnostics, **real.log.entry()})
+    more = answers.usage() | (real.log.entry() if real is not None else {})
     return replace(
         record,
+        diagnostics={**record.diagnostics, **more},
         latency=answer_times(answers.latencies, answers.server_timings),
         wall_time=time.perf_counter() - started,
         timing=timing,

@@ -222,11 +222,15 @@ class RemotePolicy:
             observation = cast("Observation", encode_images(observation))
         timeout = self.timeouts.infer if self._warm else self.timeouts.first_infer
         start = time.perf_counter()
-        answer, timing = self._when_free(
-            lambda: self._session.infer(self._id(), observation, timeout), timeout
-        )
-        reported = {name: ms for name, ms in timing.items() if math.isfinite(ms)}
-        self.last_timing = {**reported, "round_trip_ms": (time.perf_counter() - start) * 1e3}
+        try:
+            answer, timing = self._when_free(
+                lambda: self._session.infer(self._id(), observation, timeout), timeout
+            )
+        except errors.PolicyError as error:
+            self.last_timing = _finite(error.timing)
+            raise
+        round_trip = (time.perf_counter() - start) * 1e3
+        self.last_timing = {**_finite(timing), "round_trip_ms": round_trip}
         self._warm = True
         options = self.hello.get("options")
         names = options if isinstance(options, Mapping) else ()
@@ -294,6 +298,10 @@ class RemotePolicy:
         self.close()
 
 
+def _finite(timing: Mapping[str, float]) -> dict[str, float]:
+    return {name: value for name, value in timing.items() if math.isfinite(value)}
+
+
 class _RobospaClient:
     """One connection in `robospa.v1`."""
 
@@ -344,15 +352,21 @@ class _RobospaClient:
                 raise errors.ConnectionLost(
                     f"{self._transport.url} gave up the connection: {reason}"
                 )
-            if message.code == messages.BAD_ANSWER:
-                raise errors.PolicyAnswerError(errors.printable(message.message))
-            url = self._transport.url
-            raise errors.ServerError(message.code, message.message, message.retriable, url)
+            raise self._refused(message)
         if message.id != id:
             raise self._violation(f"answer {message.id} came to request {id}")
         if not isinstance(message, expected):
             raise self._violation(f"{message.type} came where {expected.type} was expected")
         return message
+
+    def _refused(self, message: messages.Error) -> errors.PolicyError:
+        error: errors.PolicyError = errors.ServerError(
+            message.code, message.message, message.retriable, self._transport.url
+        )
+        if message.code == messages.BAD_ANSWER:
+            error = errors.PolicyAnswerError(errors.printable(message.message))
+        error.timing = message.timing
+        return error
 
     def _violation(self, reason: str) -> errors.TransportError:
         self.close()

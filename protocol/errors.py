@@ -139,7 +139,9 @@ class ProtocolViolation(TransportError):
 
 
 class PolicyError(WireError):
-    """The policy failed, not the line to it."""
+    """The policy failed, not the line to it. `timing`: what its server reported with that."""
+
+    timing: Mapping[str, float] = {}
 
 
 class ServerError(PolicyError):

@@ -95,13 +95,14 @@ class Actions:
 @dataclass(frozen=True)
 class Error:
     """Answer to any request that failed. `message` is one sentence; `retriable`: the same trial
-    may succeed when it is repeated from its reset."""
+    may succeed when it is repeated from its reset; `timing` as of `actions`, of `infer`."""
 
     type: ClassVar[str] = "error"
     id: RequestId
     code: str
     message: str
     retriable: bool = False
+    timing: Mapping[str, int | float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

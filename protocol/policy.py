@@ -239,13 +239,22 @@ class OptionalMembers(Policy, Protocol):
 
     @property
     def last_timing(self) -> Mapping[str, float]:
-        """Times of the last answer that the server reported [ms]."""
+        """Times of the last answer that the server reported [ms]; and what the trial has used
+        so far, by the names of USAGE."""
 
 
 def has(policy: object, member: str) -> TypeGuard[OptionalMembers]:
     """Whether `policy` has this one of the optional members."""
     return hasattr(policy, member)
 
+
+USAGE = (
+    "requests", "repairs", "unanswered", "input_tokens", "output_tokens", "cost", "seconds",
+    "exhausted",
+)  # fmt: skip
+"""What a policy that asks a paid model may report of its trial: answers of the model, those of them
+that could not be used, requests without an answer; tokens; money; seconds that the answers took;
+and 1 if the trial ended because it had used up what it may use."""
 
 SPACES = ("joint", "ee")
 """Action spaces that the dialects of other projects have."""

@@ -28,7 +28,7 @@ from typing import TypeVar
 
 from robospa.observation import Observation
 from robospa.protocol.batching import Answer, Batcher
-from robospa.protocol.policy import Policy, PolicySpec, TrialInfo, has
+from robospa.protocol.policy import USAGE, Policy, PolicySpec, TrialInfo, has
 
 T = TypeVar("T")
 PolicyFactory = Callable[[], Policy]
@@ -131,7 +131,13 @@ class PolicySession:
         answer = self._policy.infer(observation)
         end = time.perf_counter()
         times = {"queue_ms": (start - asked) * 1e3, "infer_ms": (end - start) * 1e3, "batch": 1.0}
-        return answer, times
+        return answer, {**times, **self.usage}
+
+    @property
+    def usage(self) -> Mapping[str, float]:
+        """What the policy says of what the trial has used so far."""
+        said = self._policy.last_timing if has(self._policy, "last_timing") else {}
+        return {name: said[name] for name in USAGE if name in said}
 
     async def end(self, outcome: Mapping[str, object]) -> None:
         if has(self._policy, "end"):

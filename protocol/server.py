@@ -42,6 +42,7 @@ from robospa.protocol.errors import (
     POLICY_FAILED,
     DecodeError,
     PolicyAnswerError,
+    TransportError,
     error_sentence,
     policy_traceback,
 )
@@ -110,13 +111,14 @@ class ConnectionHandler:
             raise DecodeError(f"a client may not send {request.type}")
         except DecodeError as error:
             return Error(id, messages.BAD_MESSAGE, str(error))
-        except QueueFull as error:
+        except (QueueFull, TransportError) as error:  # or what the policy itself waits for is away
             return Error(id, messages.BUSY, f"the server is busy: {error}", retriable=True)
         except Exception as error:
             self._in_trial = False
             said = error_sentence(error)
             log.error("the policy failed: %s\n%s", said, policy_traceback(error))
-            return Error(id, POLICY_FAILED, said, getattr(error, "retriable", True))
+            retriable = getattr(error, "retriable", True)
+            return Error(id, POLICY_FAILED, said, retriable, self.policy.usage)
 
     async def _reset(self, request: messages.Reset) -> Message:
         self._in_trial = False
@@ -134,11 +136,12 @@ class ConnectionHandler:
             observation = check_observation(received, self.spec)
         except DecodeError as error:
             return Error(request.id, messages.BAD_OBSERVATION, str(error))
-        answer, timing = await self.policy.infer(observation)
         try:
+            answer, timing = await self.policy.infer(observation)
             return messages.Actions(request.id, check_chunk(answer, self.spec), timing)
         except PolicyAnswerError as error:
-            return Error(request.id, messages.BAD_ANSWER, str(error))
+            used = self.policy.usage
+            return Error(request.id, messages.BAD_ANSWER, str(error), timing=used)
 
     async def _end(self, request: messages.End) -> Message:
         if not self._in_trial:

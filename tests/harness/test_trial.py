@@ -189,12 +189,14 @@ def test_what_the_server_tells_of_its_times_is_kept_as_means() -> None:
         def infer(self, observation: object) -> np.ndarray:
             number = float(len(self.seen))
             self.last_timing = {"queue_ms": number, "infer_ms": 5.0, "batch": float("nan")}
+            self.last_timing |= {"requests": number + 1, "cost": float("nan")}
             return super().infer(observation)
 
     record = play(Telling())  # three calls
     assert record.policy_calls == 3
     assert set(record.latency) == {"p50", "p95", "p99", "max", "queue", "infer"}
     assert (record.latency["queue"], record.latency["infer"]) == (1.0, 5.0)
+    assert record.diagnostics["usage"] == {"requests": 3}
 
 
 def test_a_policy_that_tells_no_times_has_its_percentiles_only() -> None:

@@ -368,3 +368,27 @@ def test_a_session_that_fails_is_in_the_log(
     with pytest.raises(ConnectionLost):
         connect(server.url, timeouts=QUICK)
     assert "the session with 127.0.0.1" in caplog.text and "a mistake of ours" in caplog.text
+
+
+def test_a_policy_whose_own_server_is_away_is_busy_and_says_what_it_has_used(start: Any) -> None:
+    class Paying(Recall):
+        asked = 0
+
+        @property
+        def last_timing(self) -> dict[str, float]:
+            return {"requests": self.asked, "infer_ms": -1.0}
+
+        def infer(self, seen: Any) -> Any:
+            self.asked += 1
+            if self.asked == 1:
+                raise CallTimeout("the endpoint answered HTTP 429")
+            if self.asked == 3:
+                raise PolicyAnswerError("the model refused to answer")
+            return super().infer(seen)
+
+    with begun(start(Paying())) as remote:
+        assert remote.infer(observation(0))[0, 0] == 0
+        assert remote.last_timing["requests"] == 2 and remote.last_timing["infer_ms"] >= 0
+        with pytest.raises(PolicyAnswerError, match=r"^the model refused to answer$"):
+            remote.infer(observation(1))
+        assert remote.last_timing == {"requests": 3}
