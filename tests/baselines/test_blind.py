@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,18 @@ import pytest
 from numpy.typing import NDArray
 from robot_at_home import at_home
 
-from robospa.baselines import blind, hold
+from robospa.baselines import blind, hold, random, replay
+from robospa.baselines.oracle import FailingOracle, create_failing
+from robospa.baselines.reactive import FASTEST, SNAP, create, line
 from robospa.geometry import Pose
+from robospa.harness.demonstrations.changed_plans import KINDS
+from robospa.harness.running.record_store import write_actions
 from robospa.harness.skills.pick import pick
 from robospa.harness.skills.workspace import Steps, Workspace
 from robospa.harness.trial import run_trial
 from robospa.harness.world import World
+from robospa.protocol.policy import TrialInfo
+from robospa.results.failures.labels import label
 from robospa.results.records.action_problems import CLIPPED_GRIPPERS, CLIPPED_JOINTS
 from robospa.results.records.trial_record import TrialRecord
 from robospa.tasks.catalog import build_scene
@@ -120,3 +127,152 @@ def test_extreme_numbers_are_executed_as_far_as_the_robot_goes(world: World) -> 
     record = tried(world, Extreme(), "Pick_Soaps_Relational", 1, step_scale=0.015)
     assert (record.end, record.steps) == ("step_limit", 2)
     assert record.diagnostics[CLIPPED_JOINTS.name] == record.diagnostics[CLIPPED_GRIPPERS.name] == 2
+
+
+# --------------------------------------------- hold, random and replay do what they say, repeatably
+
+
+KEY = TrialKey("Pick_Fake", 3, 100007)
+TRIAL = TrialInfo("Pick_Fake", KEY.embodiment, "", policy_seed=5, key=KEY)
+STATE = np.linspace(0, 1, 14, dtype=np.float32)
+
+
+def seen(step: int = 0) -> dict[str, Any]:
+    return {"state": STATE, "step": step, "images": {}, "instruction": ""}
+
+
+def test_hold_sends_the_state_back() -> None:
+    chunk = hold.create().infer(seen())
+    assert chunk.dtype == np.float32
+    assert (chunk == STATE).all()
+
+
+def test_random_depends_on_the_policy_seed_and_the_step_only() -> None:
+    policy, other = random.create(), random.create()
+    policy.reset(TRIAL)
+    policy.infer(seen(10))
+    other.reset(TRIAL)
+    np.testing.assert_array_equal(policy.infer(seen(20)), other.infer(seen(20)))
+    assert not np.array_equal(policy.infer(seen(20)), policy.infer(seen(30)))
+
+
+def test_random_moves_otherwise_with_another_policy_seed() -> None:
+    chunks = []
+    for seed in (1, 2):
+        policy = random.create()
+        policy.reset(TrialInfo("T", "aloha-agilex", "Go.", seed))
+        chunks.append(policy.infer(seen()))
+    assert not np.array_equal(*chunks)
+
+
+def test_random_keeps_grippers_in_range() -> None:
+    chunk = random.create().infer(seen())
+    assert chunk.shape == (random.CHUNK, 14)
+    assert ((chunk[:, [6, 13]] >= 0) & (chunk[:, [6, 13]] <= 1)).all()
+
+
+def test_replay_sends_exactly_what_was_recorded(tmp_path: Path) -> None:
+    actions = np.random.default_rng(0).normal(size=(130, 14)).astype(np.float32)
+    write_actions(tmp_path, KEY, actions, "joint")
+    policy = replay.create(str(tmp_path))
+    policy.reset(TRIAL)
+    sent = np.concatenate([policy.infer(seen(0)), policy.infer(seen(100))])
+    np.testing.assert_array_equal(sent, actions)
+    np.testing.assert_array_equal(policy.infer(seen(500)), actions[-1:])
+
+
+def test_replay_refuses_what_it_does_not_have(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="no action traces"):
+        replay.create(str(tmp_path))
+    with pytest.raises(ValueError, match="--arg run="):
+        replay.create()
+    write_actions(tmp_path, KEY, np.ones((1, 14), np.float32), "joint")
+    with pytest.raises(ValueError, match="no trace of Pick_Other"):
+        replay.create(str(tmp_path)).reset(replace(TRIAL, key=replace(KEY, task="Pick_Other")))
+
+
+# ------------------------------------------ the scripted policy that looks before every few actions
+
+
+BODIES = [0, 1, 3]
+PERIOD = 0.06
+
+
+def test_a_line_ends_at_its_stop_and_is_never_faster_than_it_may() -> None:
+    start = np.array([0.0, 1.0, 1.0, 0.5], np.float32)
+    stop = np.array([0.8, 0.6, 0.0, 0.5], np.float32)
+    rows = line(start, stop, BODIES, PERIOD)
+    assert (rows[-1] == np.round(stop * 65536) / 65536).all()
+    moves = np.abs(np.diff(np.vstack([start, rows]), axis=0))[:, BODIES].max(axis=1)
+    assert moves.max() <= FASTEST * PERIOD + 1e-4
+    assert moves[-2] < moves[1], "it slows down before the stop"
+    shares = (rows - start)[:, [0, 1]] / (stop - start)[[0, 1]]
+    assert np.allclose(shares[:, 0], shares[:, 1], atol=1e-3)
+
+
+def test_a_stop_nearby_or_of_a_gripper_alone_is_one_action() -> None:
+    start = np.array([0.0, 0.0, 1.0, 0.0], np.float32)
+    for stop in ([SNAP / 2, 0, 1, 0], [0, 0, 0, 0]):
+        rows = line(start, np.array(stop, np.float32), BODIES, PERIOD)
+        assert len(rows) == 1
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"chunk": "0"}, "1 to 200"),
+        ({"chunk": "x"}, "1 to 200"),
+        ({"feedback": "maybe"}, "yes or no"),
+    ],
+)
+def test_what_cannot_be_is_refused(given: dict[str, str], says: str) -> None:
+    with pytest.raises(ValueError, match=says):
+        create(**given)
+
+
+def test_it_says_what_it_knows() -> None:
+    spec = create(chunk="5").spec
+    assert spec.privileged and spec.needs_trial_key and spec.horizon == 5
+    assert create(feedback="no").spec.name == "reactive:open-loop"
+
+
+# ---------------------------------------- policies that fail on purpose: that they fail as they say
+
+
+SEED = 930_000
+
+
+def test_an_unknown_mistake_is_refused_at_once() -> None:
+    with pytest.raises(ValueError, match="no mistake 'sulks'; there are neighbour"):
+        create_failing("sulks")
+
+
+def test_the_spec_says_which_mistake_it_is() -> None:
+    for kind in KINDS:
+        spec = FailingOracle(kind).spec
+        assert (spec.name, spec.privileged) == (f"mistakes:{kind}", True)
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize(
+    ("kind", "name", "expected"),
+    [
+        ("neighbour", "Pick_Blocks_Size", "target_grounding"),
+        ("beside", "Pick_Blocks_Size", "no_contact_grasp"),
+        ("drops", "Pick_Blocks_Size", "target_execution"),
+        ("drops", "Put_Bottles_Dustbin", "manipulation"),
+        ("swaps", "Stack_Blocks_Color_Order", "temporal_ordering"),
+        ("repeats", "Click_Can_Place_Items", "redundant_repetition"),
+        ("forgets", "Remember_Color_Cover", "memory"),
+        ("nothing", "Press_Stapler_Repeat", "no_attempt"),
+    ],
+)
+def test_a_scripted_mistake_is_labelled_as_scripted(kind: str, name: str, expected: str) -> None:
+    from robospa.harness.sim.sapien_world import SapienWorld
+    from robospa.harness.trial import run_trial
+
+    world, policy = SapienWorld(render=False), create_failing(kind)
+    found = label(run_trial(world, policy, TrialKey(name, 2, SEED), policy_seed=0))
+    world.close()
+    assert policy.applies and found is not None
+    assert found.kind == expected

@@ -5,17 +5,28 @@ from __future__ import annotations
 import ast
 import inspect
 import json
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
 import typer
+from fake_runs import KNOWN, make_run
 from hypothesis import given
 from hypothesis import settings as examples
 from hypothesis import strategies as st
+from msgspec import structs
 
 from robospa.harness.cli.eval import evaluate
 from robospa.harness.running.heartbeat import HEARTBEAT_SECONDS
+from robospa.harness.running.request import make_request
+from robospa.harness.running.worker import task_finder
+from robospa.harness.selection import (
+    list_trials,
+    parse_levels,
+    parse_numbers,
+    parse_seeds,
+    parse_tasks,
+)
 from robospa.harness.settings import (
     GROUPS,
     LEAST_STUCK_SECONDS,
@@ -23,12 +34,25 @@ from robospa.harness.settings import (
     Recording,
     Selection,
     SettingsError,
+    Simulation,
     flat,
     group_of,
     read_settings,
     to_toml,
     updated,
 )
+from robospa.harness.trial import task_parts
+from robospa.harness.worlds import SHUFFLED_PARTS, TASK_PARTS, other_seed, shuffled_parts
+from robospa.results.paper.columns import run_column
+from robospa.results.report.page import badges
+from robospa.results.report.run_card import facts
+from robospa.results.report.score_table import score_table
+from robospa.results.scoring.scores import score_run
+from robospa.tasks import catalog
+from robospa.tasks.catalog import build_scene
+from robospa.tasks.sentences import instruction
+from robospa.tasks.task import Task
+from robospa.trial import TrialKey
 
 DEFAULTS = EvaluationSettings()
 OWN = {"more", "config", "resume", "token", "latency", "as_json", "help_all"}
@@ -184,3 +208,137 @@ def test_functions_of_the_command_line_stay_short() -> None:
         if isinstance(node, ast.FunctionDef)
     }
     assert {name: length for name, length in lengths.items() if length > 60} == {}
+
+
+# -------------- shuffled sentences: of other scenes of the variant, said wherever the results stand
+
+
+KEYS = [TrialKey("Pick_Blocks_Size", 2, seed) for seed in range(100_000, 100_012)]
+
+
+def test_a_trial_has_its_scene_and_goal_and_the_sentence_of_another() -> None:
+    plain, shuffled = task_parts(KEYS[0]), shuffled_parts(KEYS[0])
+    assert shuffled.scene == plain.scene and type(shuffled.tracker) is type(plain.tracker)
+    other = build_scene("Pick_Blocks_Size", 2, other_seed(KEYS[0]), "aloha-agilex", "clean")
+    assert shuffled.instruction == instruction(other, "heldout") != plain.instruction
+    assert shuffled_parts(KEYS[0]).instruction == shuffled.instruction
+
+
+def test_no_sentence_comes_from_a_scene_that_is_evaluated() -> None:
+    seeds = [other_seed(key) for key in KEYS]
+    assert len(set(seeds)) == len(seeds) and min(seeds) >= 1_000_000 and max(seeds) < 2_000_000
+    moved = replace(KEYS[0], embodiment="piper", mode="randomized", split="train")
+    assert other_seed(moved) == other_seed(KEYS[0])
+
+
+def test_the_setting_chooses_the_parts_of_a_run(tmp_path: Path) -> None:
+    settings = EvaluationSettings(policy=("random",), out=tmp_path)
+    assert make_request(settings, keys=KEYS).config.parts == TASK_PARTS
+    shuffled = replace(settings, simulation=Simulation(shuffle_instructions=True))
+    assert make_request(shuffled, keys=KEYS).config.parts == SHUFFLED_PARTS
+    assert task_finder(SHUFFLED_PARTS)(KEYS[0]).name == "Pick_Blocks_Size"
+    with pytest.raises(SettingsError, match="suite's own trials"):
+        Simulation(shuffle_instructions=True, parts="my:parts")
+
+
+def test_it_is_said_wherever_the_results_stand(tmp_path: Path) -> None:
+    run = make_run(tmp_path / "run", KNOWN)
+    assert not any("another scene" in text for text in badges([run], ["x"]))
+    settings = structs.replace(run.manifest.settings, shuffled_instructions=True)
+    shuffled = replace(run, manifest=structs.replace(run.manifest, settings=settings))
+    shown = (
+        badges([shuffled], ["x"])[0],
+        score_table(shuffled, score_run(shuffled)).title,
+        str(facts(shuffled)),
+        run_column(shuffled).title,
+    )
+    assert all("shuffled" in text or "sentence" in text for text in shown), shown
+
+
+# ------------ what users write for tasks, levels and seeds, and what they are told when it is wrong
+
+
+def test_all_tasks_in_the_papers_order() -> None:
+    names = parse_tasks("all")
+    assert len(names) == len(set(names)) >= 10
+    assert names[0] == "Pick_Blocks_Size"
+
+
+def test_tasks_by_category_dimension_and_name() -> None:
+    assert "Pick_Blocks_Size" in parse_tasks("gac")
+    assert set(parse_tasks("spatial")) | set(parse_tasks("procedural")) == set(parse_tasks("all"))
+    assert parse_tasks("pick blocks size, GAC")[0] == "Pick_Blocks_Size"
+    assert parse_tasks("Pick_Blocks_Size,Pick_Blocks_Size") == ["Pick_Blocks_Size"]
+
+
+def test_basic_grounding_is_no_part_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fake(name: str, category: str) -> Task:
+        return replace(catalog.task("Pick_Blocks_Size"), name=name, category=category)
+
+    sets = ("CBG", "EPG", "SOI")
+    made = [fake("Base", "GAC"), *(fake(f"{c}_{i}", c) for c in sets for i in range(5))]
+    monkeypatch.setattr(catalog, "tasks", lambda: {t.name: t for t in made})
+    assert parse_tasks("all") == ["Base"]
+    assert parse_tasks("basic") == [t.name for t in made[1:]]
+    assert parse_tasks("epg") == [f"EPG_{i}" for i in range(5)]
+    assert len(parse_tasks("all,basic")) == 16
+
+
+@pytest.mark.parametrize("text", ["", "Pick_Nothing_At_All", "XYZ"])
+def test_unknown_tasks_are_refused(text: str) -> None:
+    with pytest.raises(SettingsError):
+        parse_tasks(text)
+
+
+def test_levels() -> None:
+    assert parse_levels("1,3-5") == [1, 3, 4, 5]
+
+
+@pytest.mark.parametrize("text", ["0", "6", "", "2-1", "1-", "-1", "a", "1,,2", "1-99999999"])
+def test_levels_that_do_not_exist_are_refused(text: str) -> None:
+    with pytest.raises(SettingsError):
+        parse_levels(text)
+
+
+def test_numbers_keep_their_order_and_lose_repetitions() -> None:
+    assert parse_numbers("5,3-4,5", "seeds") == [5, 3, 4]
+    with pytest.raises(SettingsError, match="is more than"):
+        parse_numbers(str(10**23), "seeds")
+
+
+@pytest.mark.parametrize("text", ["{", '{"A": {"1": [1.5]}}', '{"A": {"1": [-1]}}', "{}"])
+def test_bad_seed_files_are_named(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "seeds.json"
+    path.write_text(text)
+    with pytest.raises(SettingsError, match=r"seeds\.json"):
+        parse_seeds(str(path))("A", 1)
+
+
+def test_the_first_seeds_of_every_variant() -> None:
+    tasks = "Pick_Blocks_Size,Press_Stapler_Repeat"
+    keys = list_trials(Selection(tasks, "1,2", 2, "7-9", "train"))
+    assert [(k.task, k.level, k.seed) for k in keys][:3] == [
+        ("Pick_Blocks_Size", 1, 7), ("Pick_Blocks_Size", 1, 8), ("Pick_Blocks_Size", 2, 7)
+    ]  # fmt: skip
+    assert len(keys) == 8
+    assert {(k.embodiment, k.mode, k.split) for k in keys} == {("aloha-agilex", "clean", "train")}
+
+
+def test_a_variant_with_too_few_seeds_is_named() -> None:
+    with pytest.raises(SettingsError, match="Pick_Blocks_Size level 1 has 3 seeds, not 4"):
+        list_trials(Selection("Pick_Blocks_Size", "1", 4, "7-9,7"))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        (Selection(embodiment="nao"), r"no embodiment 'nao'; known are .*aloha-agilex"),
+        (Selection(embodiment="aloha_agilex"), r"did you mean aloha-agilex\?"),
+        (Selection(mode="cleen"), r"no scene mode 'cleen'; did you mean clean\?"),
+    ],
+)
+def test_robots_and_modes_that_are_not_installed_are_refused(
+    wrong: Selection, sentence: str
+) -> None:
+    with pytest.raises(SettingsError, match=sentence):
+        list_trials(wrong)

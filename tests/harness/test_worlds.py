@@ -6,10 +6,17 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from run_fakes import KEYED, FakePolicy, FakeWorld, parts
 
+from robospa.harness import machine_check
 from robospa.harness.settings import EvaluationSettings, SettingsError, updated
+from robospa.harness.sim.vulkan import Device
+from robospa.harness.trial import new_run_seed, policy_seed, run_trial, salt_hash, trial_id
 from robospa.harness.worlds import SAPIEN, WorldKind, open_world, world_kind
+from robospa.protocol.codec import decode
+from robospa.protocol.messages import Reset, pack
 from robospa.registry import UnknownName
+from robospa.trial import TrialKey
 
 
 def settings(**given: Any) -> EvaluationSettings:
@@ -69,3 +76,93 @@ def test_actions_at_a_rate_of_their_own_are_an_argument_of_each_simulator() -> N
     assert SAPIEN.arguments(usual) == {"render": None, "control": "rest_to_rest"}
     assert SAPIEN.arguments(timed)["action_steps"] == unknown.arguments(timed)["action_steps"] == 10
     assert unknown.arguments(usual) == {}
+
+
+# ---------------------------------------- what a machine lacks, with healthy and with broken checks
+
+
+def test_a_passing_check_needs_nothing_done(capsys: pytest.CaptureFixture[str]) -> None:
+    machine_check.report(lambda: "fine")
+    assert capsys.readouterr().out == '{"ok": true, "detail": "fine"}\n'
+
+
+def test_a_failing_check_says_why(capsys: pytest.CaptureFixture[str]) -> None:
+    def broken() -> str:
+        raise RuntimeError("no device")
+
+    machine_check.report(broken)
+    assert '"detail": "RuntimeError: no device"' in capsys.readouterr().out
+
+
+def test_a_check_whose_process_dies_is_a_finding() -> None:
+    check = machine_check._run("driver", "no_such_check", "install one")
+    assert not check.ok
+    assert check.fix == "install one"
+    assert "AttributeError" in check.detail
+
+
+@pytest.mark.parametrize(
+    ("version", "too_old"),
+    [
+        ("Mesa 22.3.6", True),
+        ("Mesa 24.2.8", True),
+        ("Mesa 24.3.0", False),
+        ("Mesa 25.0.7-2", False),
+    ],
+)
+def test_an_old_software_driver_is_recognised(version: str, too_old: bool) -> None:
+    assert Device("llvmpipe (LLVM 15)", "llvmpipe", version).too_old is too_old
+
+
+def test_a_gpu_driver_is_never_too_old() -> None:
+    assert not Device("GeForce", "NVIDIA", "535.1").too_old
+
+
+@pytest.mark.sim
+def test_all_checks_of_this_machine_are_named_and_have_a_fix_if_they_fail() -> None:
+    checks = list(machine_check.run_checks())
+    names = [c.name for c in checks]
+    assert names[:4] == ["processor", "simulator", "physics", "vulkan device"]
+    assert all(bool(c.fix) is not c.ok for c in checks)
+
+
+# -------------------------------------------------- what a policy is sent in place of a trial's key
+
+
+KEY = TrialKey("Pick_Blocks_Size", 3, 100007)
+SALT = "ab" * 32
+TOLD = {"task", "embodiment", "instruction", "policy_seed", "id", "extra", "joints"}
+"""All that a policy learns of a trial unless it asks for the key."""
+
+
+def sent(policy: FakePolicy) -> dict[str, object]:
+    """The trial as it lies in the bytes of `reset`."""
+    run_trial(FakeWorld(), policy, KEY, policy_seed=5, trial_id="a1", parts=parts)
+    assert policy.trial is not None
+    message = decode(pack(Reset(1, policy.trial)))
+    assert isinstance(message, dict)
+    found: dict[str, object] = message["trial"]
+    return found
+
+
+def test_no_policy_is_sent_level_seed_mode_or_split() -> None:
+    assert sent(FakePolicy()).keys() == TOLD
+    assert sent(FakePolicy())["id"] == "a1"
+
+
+def test_one_that_asks_is_sent_the_key() -> None:
+    policy = FakePolicy(KEYED)
+    assert sent(policy).keys() == TOLD | {"key"}
+    assert policy.trial is not None and policy.trial.key == KEY
+
+
+def test_ids_and_policy_seeds_follow_from_the_run_and_the_key() -> None:
+    """A run of an older version has the seed 0: its bundle must still be what it says."""
+    assert policy_seed(KEY, 0) == policy_seed(KEY, "0") == 634677935
+    for value in (policy_seed, trial_id):
+        mine = new_run_seed()
+        made = {value(KEY, mine), value(KEY, 0), value(KEY, "1"), value(KEY, new_run_seed())}
+        assert len(made | {value(replace(KEY, seed=100008), mine)}) == 5
+        assert value(KEY, mine) in made
+    assert 0 <= policy_seed(KEY, SALT) < 2**31
+    assert salt_hash(SALT) not in (SALT, salt_hash("cd" * 32))

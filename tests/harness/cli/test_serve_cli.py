@@ -5,18 +5,25 @@ from __future__ import annotations
 import json
 import threading
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+import typer
+from checkouts import write_checkout
+from command_line import robospa
+from fake_runs import KNOWN, make_run, outcomes, write
 
 from robospa.clients import connect
 from robospa.harness.cli import main as cli
 from robospa.harness.cli import serve as command
+from robospa.harness.cli.main import COMMANDS, command_of, main
 from robospa.harness.factory import load_function
+from robospa.harness.official.checkout_world import CheckoutFinding
 from robospa.protocol.options import option, option_table
 from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.server import ServerThread
@@ -203,3 +210,101 @@ def test_a_shared_model_answers_two_connections() -> None:
         for thread in threads:
             thread.join(30)
     assert [chunk.shape for chunk in chunks] == [(2, 14)] * 2
+
+
+# ----------------------- `robospa view`: says where to look, ends when told, refuses what is no run
+
+
+def test_it_shows_a_run_for_a_while(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = make_run(tmp_path / "run", KNOWN).folder
+    with pytest.raises(SystemExit) as stop:
+        main(["view", str(folder), "--minutes", "0.0001"])
+    assert not stop.value.code
+    assert "http://127.0.0.1:" in capsys.readouterr().out
+
+
+def test_what_is_no_run_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(["view", str(tmp_path)])
+    assert stop.value.code == 1
+    assert "is not a run" in capsys.readouterr().err
+
+
+# -------------------------------- `robospa official checkout` from the command line: what it prints
+
+
+def test_findings_and_seeds_as_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    findings = [
+        CheckoutFinding("scene", None, "seed 100004"),
+        CheckoutFinding("torch", False, "2.13, not 2.4"),
+    ]
+    closed = SimpleNamespace(close=lambda: None)
+    official = "robospa.harness.official"
+    monkeypatch.setattr(f"{official}.checkout_world.CheckoutWorld", lambda *_, **__: closed)
+    monkeypatch.setattr(f"{official}.checkout_world.examine", lambda *_: iter(findings))
+    monkeypatch.setattr(f"{official}.checkout_world.valid_seeds", lambda *_: [100_000, 100_004])
+    done = robospa("official", "checkout", tmp_path, "--json")
+    assert done.code == 1 and json.loads(done.out) == [
+        {"what": "scene", "good": None, "seen": "seed 100004"},
+        {"what": "torch", "good": False, "seen": "2.13, not 2.4"},
+    ]
+    assert (
+        robospa("official", "checkout", tmp_path).out.splitlines()[1] == "LOOK torch: 2.13, not 2.4"
+    )
+    words = ("--tasks", "Click_Bell_Repeat", "--levels", "2", "--trials", "2", "--json")
+    done = robospa("official", "checkout", tmp_path, "--find", tmp_path / "seeds.json", *words)
+    assert json.loads(done.out) == {"Click_Bell_Repeat": {"2": [100_000, 100_004]}}
+    assert done.code == 0 and done.err == "Click_Bell_Repeat level 2: 2 seeds, 5 tried\n"
+
+
+# ---------- `--json`: every command that reports has it, and standard output is then one JSON value
+
+
+TASK = "Pick_Blocks_Size"
+SILENT = {
+    "demo": "shows how the others look",
+    "serve": "runs until it is stopped",
+    "view": "opens a browser",
+    "learn": "prints the folder",
+    "submit template": "prints a TOML file",
+}
+"""Commands that report nothing to a program, and why."""
+HERE = {
+    "report": "report {run}",
+    "compare": "compare {run} {other}",
+    "paper": "paper --out {tmp}/paper --table basic",
+    "tasks": "tasks Pick_Blocks_Size",
+    "official instructions": "official instructions {tmp}/checkout --levels 2 --tasks {task}",
+    "leaderboard build": "leaderboard build --submissions {tmp}/none --out {tmp}/site",
+}
+
+
+def commands() -> Iterator[tuple[str, Any]]:
+    """Every command with its name, such as `submit verify`."""
+    for name in COMMANDS:
+        found = command_of(name)
+        app = found if isinstance(found, typer.Typer) else typer.Typer()
+        if app is not found:
+            app.command(name)(found)
+        command: Any = typer.main.get_command(app)
+        parts = getattr(command, "commands", {})
+        if not parts or command.invoke_without_command:
+            yield name, command
+        yield from ((f"{name} {part}", one) for part, one in parts.items())
+
+
+def test_every_command_that_reports_has_json() -> None:
+    having = {name for name, one in commands() if any("--json" in p.opts for p in one.params)}
+    assert having == {name for name, _ in commands()} - set(SILENT)
+
+
+@pytest.mark.parametrize("line", HERE.values(), ids=HERE)
+def test_standard_output_is_one_json_value(line: str, tmp_path: Path) -> None:
+    for name, found in (("one", [1, 1, 0]), ("two", [1, 0, 0])):
+        write(tmp_path / name, outcomes("Pick_Blocks_Size", 1, found))
+    write_checkout(tmp_path / "checkout")
+    words = line.format(
+        run=tmp_path / "one", other=tmp_path / "two", tmp=tmp_path, task=TASK
+    ).split()
+    done = robospa(*words, "--json")
+    assert json.loads(done.out) and "Traceback" not in done.err

@@ -4,12 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
+from pathlib import Path
 
 import pytest
 
-from robospa.harness.seeds.attempt import Attempt
-from robospa.harness.seeds.sweep import PATIENCE, Search, sweep
-from robospa.tasks.seeds import ListKey
+import robospa
+from robospa.harness.running.code_hash import files_of
+from robospa.harness.seeds import lists as module
+from robospa.harness.seeds.attempt import Attempt, Evidence
+from robospa.harness.seeds.lists import (
+    LOCAL,
+    SHIPPED,
+    find_list,
+    inputs,
+    local_file,
+    read_levels,
+    save,
+)
+from robospa.harness.seeds.summary import expert_table, read_rows, row_of, write_rows
+from robospa.harness.seeds.sweep import PATIENCE, Search, confirm, sweep
+from robospa.harness.selection import list_trials, parse_embodiments, parse_modes, seed_sources
+from robospa.harness.settings import Selection, SettingsError
+from robospa.tasks.seeds import ListKey, NoSeedList, accepted, list_hash
 
 ONE, OTHER = ListKey("One", 1), ListKey("Other", 2, "piper", "dark")
 
@@ -90,3 +106,191 @@ def test_an_error_is_a_reason_like_another() -> None:
     assert attempt(world, expert, ListKey("Pick_Blocks_Size", 1), 100_000).accepted
     found = attempt(world, expert, ListKey("Pick_Blocks_Size", 1, "no-robot"), 100_000)
     assert not found.accepted and "no-robot" in found.reason
+
+
+# ------------- A list made with other code stands only where its trials, run again, end as they did
+
+
+SAME, CHANGED, UNKNOWN = ListKey("Same", 1), ListKey("Changed", 1), ListKey("Unknown", 1)
+
+
+def submit(key: ListKey, seed: int) -> Future[Attempt]:
+    """Ends every trial after as many physics steps as its seed has, one more for CHANGED."""
+    future: Future[Attempt] = Future()
+    future.set_result(_ended(seed, seed + (key == CHANGED)))
+    return future
+
+
+def _ended(seed: int, steps: int) -> Attempt:
+    return Attempt(seed, seed % 2 == 0, digest="d", physics_steps=steps)
+
+
+def test_what_ends_as_before_holds(tmp_path: Path) -> None:
+    kept = Evidence(tmp_path)
+    for key in (SAME, CHANGED):
+        for seed in range(6):
+            kept.add(key, "old", _ended(seed, seed))
+    made = {SAME: "old", CHANGED: "old", UNKNOWN: "old"}
+    same, changed, unknown = confirm(submit, made, kept, 2)
+    assert same.holds and same.tried == 3  # seeds 0 and 2, and 1, which was refused
+    assert not changed.holds and changed.differs == (0, 2, 1)
+    assert not unknown.holds and unknown.tried == 0
+
+
+def test_attempts_that_are_adopted_count_under_both_inputs(tmp_path: Path) -> None:
+    kept = Evidence(tmp_path)
+    kept.add(SAME, "old", _ended(4, 4))
+    kept.adopt(SAME, "old", "new")
+    assert kept.attempts(SAME, "new") == kept.attempts(SAME, "old") == {4: _ended(4, 4)}
+
+
+# ----------------------------------------------- what is kept of a sweep, and what it is kept under
+
+
+KEY = ListKey("Pick_Blocks_Size", 1)
+SOLVED, LOST = Attempt(7, True, "", "ab", 100, 3, 0.25), Attempt(8, False, "no arm, 3.5 cm off")
+
+
+def test_finished_attempts_survive_a_torn_line_and_other_inputs_do_not_count(
+    tmp_path: Path,
+) -> None:
+    kept = Evidence(tmp_path)
+    kept.add(KEY, "a", SOLVED)
+    with kept.path(KEY).open("ab") as file:
+        file.write(b'{"level": 1, "inputs": "a", "se')
+    kept.add(KEY, "a", LOST)
+    kept.add(KEY, "b", Attempt(9, True))
+    kept.add(KEY._replace(level=2), "a", Attempt(10, True))
+    assert kept.attempts(KEY, "a") == {7: SOLVED, 8: LOST}
+    assert kept.attempts(KEY, "b").keys() == {9}
+    assert kept.attempts(ListKey("Other", 1), "a") == {}
+
+
+def test_inputs_are_of_what_a_task_executes(monkeypatch: pytest.MonkeyPatch) -> None:
+    root = Path(robospa.__path__[0])
+    counted: list[str] = []
+
+    def hashed(folders: tuple[str, ...], left_out: tuple[str, ...] = ()) -> str:
+        counted.extend(files_of(root, folders, left_out))
+        return ""
+
+    monkeypatch.setattr(module, "code_hash", hashed)
+    module._hash.cache_clear()
+    first = inputs(KEY)
+    module._hash.cache_clear()
+    for path in ("harness/skills/pick.py", "tasks/objects/boxes.py", "harness/robots/piper.py",
+                 "tasks/families/block_measures.py", "baselines/oracle.py"):  # fmt: skip
+        assert path in counted
+    for path in ("tasks/families/repeat.py", "tasks/instructions/__init__.py",
+                 "harness/running/runner.py", "protocol/server.py"):  # fmt: skip
+        assert (root / path).exists() and path not in counted
+    assert inputs(KEY._replace(level=5)) == first
+    other = KEY._replace(mode="own:light")
+    monkeypatch.setattr(module, "module_of", lambda group, name: "numpy" * (name == "own"))
+    assert inputs(other) != first
+    module._hash.cache_clear()
+
+
+def test_a_list_made_here_is_found_by_evaluations_until_its_inputs_change(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROBOSPA_CACHE", str(tmp_path))
+    key = KEY._replace(mode="randomized:clutter=3")
+    with pytest.raises(NoSeedList, match="--mode randomized:clutter=3"):
+        find_list(key)
+    save(local_file(key), 1, [5, 6, 7])
+    save(local_file(key), 2, [8])
+    assert find_list(key).origin == LOCAL and find_list(key).seeds == (5, 6, 7)
+    assert find_list(KEY).origin == SHIPPED
+    chosen = Selection("Pick_Blocks_Size", "1", 2, mode="randomized:clutter=3")
+    trials = list_trials(chosen)
+    assert [trial.seed for trial in trials] == [5, 6]
+    (row,) = seed_sources(chosen, trials)
+    assert (row["origin"], row["hash"]) == (LOCAL, list_hash({key: (5, 6, 7)}))
+    monkeypatch.setattr("robospa.harness.seeds.lists.inputs", lambda key: "other")
+    with pytest.raises(
+        SettingsError, match="make them with `robospa seeds Pick_Blocks_Size --levels"
+    ):
+        list_trials(chosen)
+
+
+def test_a_run_knows_whose_seeds_it_takes() -> None:
+    shipped = Selection("Pick_Blocks_Size", "1,2", 3)
+    (row,) = seed_sources(shipped, list_trials(shipped))
+    assert row == {
+        "embodiment": "aloha-agilex",
+        "mode": "clean",
+        "origin": SHIPPED,
+        "hash": list_hash({KEY: accepted(*KEY), KEY._replace(level=2): accepted(KEY.task, 2)}),
+    }
+    given = Selection("Pick_Blocks_Size", "1", 2, "7-8", mode="randomized")
+    (row,) = seed_sources(given, list_trials(given))
+    assert (row["mode"], row["origin"]) == ("randomized", "given")
+    assert row["hash"] == list_hash({KEY._replace(mode="randomized"): [7, 8]})
+
+
+def test_one_command_makes_all_lists_that_are_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROBOSPA_CACHE", str(tmp_path))
+    chosen = Selection("GAC,Press_Stapler_Repeat", "1,3", embodiment="aloha-agilex,piper:0.75")
+    names = "Pick_Blocks_Size,Pick_Blocks_Height,Pick_Blocks_Length,Pick_Blocks_Area"
+    command = rf"`robospa seeds {names},Press_Stapler_Repeat --levels 1,3 --embodiment piper:0\.75`"
+    with pytest.raises(SettingsError, match=f"of 5 tasks with piper.* {command}"):
+        list_trials(chosen)
+
+
+def test_an_empty_list_takes_the_old_one_out(tmp_path: Path) -> None:
+    path = tmp_path / "robot" / "T.json"
+    for level, seeds in ((2, [1]), (1, [3, 4]), (2, [])):
+        save(path, level, seeds)
+    assert read_levels(path) == {1: (3, 4)}
+    path.write_text("{")
+    assert read_levels(path) == {}
+
+
+def test_rows_of_the_experts_table(tmp_path: Path) -> None:
+    search = Search(KEY, 7, 2, attempts={7: SOLVED, 8: LOST, 9: Attempt(9, True, seconds=0.75)})
+    row = row_of(search, "abc")
+    assert (row.tried, row.accepted, row.seconds) == (3, 2, 0.5)
+    assert row.reasons == "1x no arm, # cm off"
+    path = tmp_path / "oracle.csv"
+    write_rows(path, {(KEY, 7): row})
+    assert read_rows(path) == {(KEY, 7): row}
+    assert read_rows(tmp_path / "none.csv") == {}
+    table = expert_table([row])
+    assert [line.label for line in table.rows] == ["GAC", "level 1", "all"]
+    assert {line.cells[0].text for line in table.rows} == {"66.7"}
+    assert table.notes == ("Below 95 %: Pick_Blocks_Size level 1 (2/3).",)
+
+
+def test_modes_with_equal_bodies_share_their_lists() -> None:
+    assert find_list(KEY._replace(mode="randomized:light,texture")).origin == SHIPPED
+    names = "clean, randomized:light,clutter,randomized:height,randomized-seen"
+    assert parse_modes(names) == [
+        "clean", "randomized:light,clutter", "randomized:height", "randomized-seen"
+    ]  # fmt: skip
+    with pytest.raises(SettingsError, match="no scene mode 'clutter'"):
+        parse_modes("clean,clutter")
+
+
+def test_trials_of_several_robots_modes_and_splits() -> None:
+    chosen = Selection(
+        "Pick_Blocks_Size", "1", 2, split="heldout,train", embodiment="aloha-agilex,piper",
+        mode="clean,randomized:light", seeds="5-6",
+    )  # fmt: skip
+    keys = list_trials(chosen)
+    assert len(keys) == len(set(keys)) == 16
+    assert {key.variant for key in keys} == {("Pick_Blocks_Size", 1)}
+    assert {row["origin"] for row in seed_sources(chosen, keys)} == {"given"}
+    with pytest.raises(SettingsError, match="split 'test' is not one of heldout, train"):
+        Selection(split="heldout,test")
+
+
+def test_robots_are_named_by_list_or_all() -> None:
+    assert parse_embodiments("aloha-agilex, aloha-agilex") == ["aloha-agilex"]
+    assert "aloha-agilex" in parse_embodiments("all")
+    with pytest.raises(SettingsError, match="names no robot; known are"):
+        parse_embodiments(" ,")
+    with pytest.raises(SettingsError, match=r"did you mean aloha-agilex\?"):
+        parse_embodiments("aloha-agilex,aloha_agilex")

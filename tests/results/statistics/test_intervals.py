@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robospa.results.paper.published import load
 from robospa.results.statistics.intervals import (
     METHODS,
     Estimate,
@@ -28,7 +29,23 @@ from robospa.results.statistics.intervals import (
     paired_sample_difference,
     wilson,
 )
-from robospa.results.statistics.samples import Sample, rate
+from robospa.results.statistics.samples import (
+    Sample,
+    draw,
+    draw_over_tasks,
+    progress,
+    rate,
+    resample_episodes,
+)
+from robospa.results.statistics.significance import (
+    at_least,
+    benjamini_hochberg,
+    boschloo,
+    mcnemar_mid_p,
+    p_of_difference,
+    p_of_interval,
+    supported_best,
+)
 
 
 @pytest.mark.parametrize(
@@ -349,3 +366,256 @@ def test_an_unpaired_difference(p: float, q: float) -> None:
 
 def test_a_coverage_is_the_same_every_time() -> None:
     assert average_coverage([0.1, 0.3]) == average_coverage([0.1, 0.3])
+
+
+# ----------- the bootstrap drawn from exact distributions, against resampled episodes and the paper
+
+
+SPATIAL = ("GAC", "SDE", "CPI", "RRR", "CVR")
+PROCEDURAL = ("RPF", "OFE", "OCE", "CAC", "MIP")
+COLUMNS = {"spatial": SPATIAL, "procedural": PROCEDURAL, "overall": SPATIAL + PROCEDURAL}
+
+
+def published_cells(
+    model: str, categories: tuple[str, ...], level: int = 5
+) -> tuple[list[Sample], list[float]]:
+    data, members = load(), load().members
+    samples, weights = [], []
+    for category in categories:
+        for task in members[category]:
+            successes = data.value(model, "sr", task, level)
+            assert successes is not None
+            samples.append(rate(int(successes), 100))
+            weights.append(1 / (len(categories) * len(members[category])))
+    return samples, weights
+
+
+def distances() -> list[float]:
+    """How far our 24 interval ends are from the printed ones, in points."""
+    found = []
+    for model, row in load().intervals.rows.items():
+        for column, categories in COLUMNS.items():
+            drawn = draw(*published_cells(model, categories))
+            ours = 100 * np.percentile(drawn, [2.5, 97.5])
+            found += [abs(a - b) for a, b in zip(ours, row[column][1:], strict=True)]
+    return found
+
+
+def test_the_papers_interval_table_within_the_noise_of_ten_thousand_resamples() -> None:
+    found = distances()
+    assert len(found) == 24
+    assert np.mean(found) <= 0.03
+    assert sum(d <= 0.05 for d in found) >= 20
+
+
+def test_one_seed_gives_one_answer_and_another_seed_another() -> None:
+    cells = published_cells("RDT", SPATIAL)
+    first, again, other = draw(*cells, 7), draw(*cells, 7), draw(*cells, 8)
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
+    groups = [cells[0][:4], cells[0][4:9]]
+    assert np.array_equal(draw_over_tasks(groups, 7, 500), draw_over_tasks(groups, 7, 500))
+
+
+def test_a_coin_thrown_twice() -> None:
+    drawn = draw([rate(1, 2)], [1.0], resamples=100_000)
+    shares = [float(np.mean(drawn == v)) for v in (0.0, 0.5, 1.0)]
+    assert shares == pytest.approx([0.25, 0.5, 0.25], abs=0.006)
+
+
+@pytest.mark.parametrize(
+    "samples",
+    [
+        [rate(1, 100), rate(30, 100), rate(99, 100)],
+        [rate(22, 100, candidates=6), rate(50, 100, candidates=2)],
+        [Sample((60, 25, 10, 5), 1 / 3), Sample((97, 0, 3), 0.5)],
+        [Sample((10, 70, 20), 1.0, -1.0)],
+    ],
+    ids=["rates", "onta", "progress", "paired"],
+)
+def test_drawing_sums_is_resampling_episodes(samples: list[Sample]) -> None:
+    weights = [1 / len(samples)] * len(samples)
+    fast = draw(samples, weights, seed=1, resamples=40_000)
+    slow = resample_episodes(samples, weights, seed=2, resamples=40_000)
+    noise = slow.std() / math.sqrt(40_000)
+    assert abs(fast.mean() - slow.mean()) < 6 * noise
+    assert fast.std() == pytest.approx(slow.std(), rel=0.03)
+    ends = [np.percentile(x, [2.5, 25, 75, 97.5]) for x in (fast, slow)]
+    step = max(s.scale / s.trials for s in samples) / len(samples)  # means lie on a grid
+    assert ends[0] == pytest.approx(ends[1], abs=0.05 * slow.std() + 1.01 * step)
+
+
+def test_a_variant_that_never_varies_is_drawn_as_it_is() -> None:
+    drawn = draw([rate(0, 100), rate(100, 100), rate(0, 9, candidates=3)], [1.0, 1.0, 1.0])
+    assert drawn == pytest.approx(np.full(10_000, 1.0 - 0.5))
+
+
+def test_sums_beyond_sixteen_bits() -> None:
+    drawn = draw([rate(69_000, 70_000)], [1.0], resamples=2000)
+    assert drawn.mean() == pytest.approx(69 / 70, abs=1e-4)
+    assert drawn.std() == pytest.approx(math.sqrt(69 / 70 / 70 / 70_000), rel=0.1)
+
+
+def test_other_tasks_make_the_interval_of_the_paper_three_to_four_times_wider() -> None:
+    data, members = load(), load().members
+    groups = [
+        [rate(int(data.value("RDT", "sr", t, 5) or 0), 100) for t in members[c]] for c in members
+    ]
+    low, high = 100 * np.percentile(draw_over_tasks(groups), [2.5, 97.5])
+    assert (low, high) == pytest.approx((4.9, 9.3), abs=0.15)
+
+
+def test_progress_counts_subtasks() -> None:
+    found = progress([(0, 4), (1, 4), (4, 4), (3, 4)])
+    assert found.counts == (1, 1, 0, 1, 1)
+    assert found.value == pytest.approx(0.5)
+    assert progress([(1, 2), (1, 3)]).value == pytest.approx((1 / 2 + 1 / 3) / 2)
+
+
+def test_onta_by_hand() -> None:
+    assert rate(22, 100, candidates=6).value == pytest.approx(0.064)
+    assert rate(50, 100, candidates=2).value == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: rate(3, 2), "3 successes in 2 trials is no rate"),
+        (lambda: rate(0, 0), "0 successes in 0 trials is no rate"),
+        (lambda: rate(1, 2, candidates=1), "chance among 1 candidates is certainty"),
+        (lambda: progress([(3, 2)]), "3 of 2 subtasks done is no progress"),
+        (lambda: progress([]), "are no counts"),
+        (lambda: Sample((1, 1), -1.0), "not positive"),
+        (lambda: draw([], []), "one weight for each of at least one sample"),
+        (lambda: draw_over_tasks([[]]), "at least one task in every category"),
+    ],
+)
+def test_what_is_no_sample_is_refused(make: object, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        make()  # type: ignore[operator]
+
+
+# ---------------------------------- tests of differences, against numbers by hand and against SciPy
+
+
+def test_mcnemar_by_hand() -> None:
+    # 5 against 1: (1 + 6) / 64 doubled, less the half of what was seen, doubled: 6 / 64
+    assert mcnemar_mid_p(5, 1) == pytest.approx((2 * 7 - 6) / 64)
+    assert mcnemar_mid_p(0, 0) == mcnemar_mid_p(4, 4) == 1.0
+    assert mcnemar_mid_p(3, 9) == mcnemar_mid_p(9, 3)
+    assert mcnemar_mid_p(0, 40) == pytest.approx(2.0**-40, rel=1e-9)
+    with pytest.raises(ValueError, match="no counts"):
+        mcnemar_mid_p(-1, 2)
+
+
+def test_mcnemar_agrees_with_scipys_binomial() -> None:
+    from scipy.stats import binom
+
+    for b, c in ((17, 9), (2, 11), (400, 350)):
+        low = min(b, c)
+        expected = 2 * binom.cdf(low, b + c, 0.5) - binom.pmf(low, b + c, 0.5)
+        assert mcnemar_mid_p(b, c) == pytest.approx(expected)
+
+
+def test_boschloo_of_two_trials_by_hand() -> None:
+    # Only 0 of 1 against 1 of 1 is as extreme: (1 - p) p is at most 1/4, and both sides double it.
+    assert boschloo(rate(0, 1), rate(1, 1)) == pytest.approx(0.5)
+    assert boschloo(rate(3, 10), rate(3, 10)) == 1.0
+
+
+@pytest.mark.parametrize("table", [(20, 33, 100, 100), (0, 5, 100, 100), (9, 3, 30, 12)])
+def test_boschloo_agrees_with_scipy(table: tuple[int, int, int, int]) -> None:
+    from scipy.stats import boschloo_exact
+
+    a, b, n, m = table
+    expected = boschloo_exact([[a, b], [n - a, m - b]]).pvalue
+    assert boschloo(rate(a, n), rate(b, m)) == pytest.approx(expected, abs=1e-5)
+
+
+@pytest.mark.parametrize(("a", "b"), [(0, 5), (20, 33), (30, 44), (50, 64)])
+def test_the_smallest_difference_that_a_hundred_trials_show(a: int, b: int) -> None:
+    assert boschloo(rate(a, 100), rate(b, 100)) < 0.05 <= boschloo(rate(a, 100), rate(b - 1, 100))
+
+
+def test_boschloo_refuses_progress_and_thousands_of_trials() -> None:
+    with pytest.raises(ValueError, match="progress has none"):
+        boschloo(Sample((1, 1, 1)), rate(1, 3))
+    with pytest.raises(ValueError, match="5000 trials takes too long"):
+        boschloo(rate(1, 5000), rate(2, 5000))
+
+
+def test_p_of_an_interval_by_hand() -> None:
+    assert p_of_interval(Estimate(1.0, 0.0, 2.0)) == pytest.approx(0.05)
+    assert p_of_interval(Estimate(-2.0, -3.0, -1.0)) == pytest.approx(0.0000887, abs=1e-6)
+    assert p_of_interval(Estimate(0.0, 0.0, 0.0)) == 1.0
+    with pytest.raises(ValueError, match="without width"):
+        p_of_interval(Estimate(1.0, 1.0, 2.0))
+
+
+def test_p_of_an_interval_is_small_exactly_if_zero_is_outside() -> None:
+    for b in range(0, 40):
+        found = paired_difference(b, 12, 100)
+        assert (p_of_interval(found) < 0.05) == (found.low > 0 or found.high < 0)
+
+
+def test_benjamini_hochberg_by_hand() -> None:
+    assert benjamini_hochberg([0.01, 0.04, 0.03, 0.5]) == pytest.approx(
+        [0.04, 0.04 * 4 / 3, 0.04 * 4 / 3, 0.5]
+    )
+    assert benjamini_hochberg([]) == []
+
+
+def test_benjamini_hochberg_agrees_with_scipy() -> None:
+    from scipy.stats import false_discovery_control
+
+    chances = [0.001, 0.2, 0.03, 0.03, 0.9, 0.0]
+    assert benjamini_hochberg(chances) == pytest.approx(false_discovery_control(chances))
+
+
+def test_the_best_are_better_than_another_and_worse_than_none() -> None:
+    row = [rate(50, 100), rate(48, 100), None, rate(5, 100)]
+    assert supported_best([row]) == [frozenset({0, 1})]
+    assert supported_best([row]) == supported_best([row])
+    assert supported_best([[None, None], []]) == [frozenset(), frozenset()]
+    assert supported_best([[rate(0, 100)] * 3]) == [frozenset()]
+
+
+def test_a_handful_of_trials_is_never_the_best() -> None:
+    """0 of 3 cannot be told from 58 of 100, but is better than nothing either."""
+    assert p_of_difference(rate(58, 100), rate(0, 3)) > 0.05
+    assert supported_best([[rate(58, 100), rate(20, 100), rate(0, 3)]]) == [frozenset({0})]
+    assert supported_best([[rate(58, 100), rate(0, 3)]]) == [frozenset()]
+    assert supported_best([[rate(58, 100), rate(3, 3)]]) == [frozenset()]
+
+
+def test_many_rows_ask_for_more_evidence() -> None:
+    close, equal = [rate(33, 100), rate(20, 100)], [rate(30, 100), rate(30, 100)]
+    assert supported_best([close]) == [frozenset({0})]
+    assert supported_best([close, *[equal] * 9])[0] == frozenset()
+
+
+def test_averages_are_told_apart_by_the_interval_of_their_difference() -> None:
+    high = interval_of([rate(60, 100), rate(40, 100)])
+    low, near = interval_of([rate(20, 100)] * 2), interval_of([rate(55, 100), rate(43, 100)])
+    assert supported_best([[low, high, near]]) == [frozenset({1, 2})]
+    assert p_of_difference(high, low) < 0.001
+    assert p_of_difference(rate(1, 2), high) > 0.05  # a sample and an average
+
+
+def test_half_of_the_papers_best_cells_are_supported() -> None:
+    data = load()
+    rows = [
+        [rate(int(data.value(m, "sr", t, n) or 0), 100) for m in data.models]
+        for t in data.tasks
+        for n in range(1, 6)
+    ]
+    marked = supported_best(rows)
+    assert len(marked) == 280
+    assert sum(len(places) == 1 for places in marked) == 142
+    assert sum(len(places) == 0 for places in marked) == 33
+
+
+def test_so_many_successes_or_more_of_trials_of_several_kinds() -> None:
+    assert at_least(3, {0.5: 4}) == pytest.approx(5 / 16)
+    assert at_least(3, {0.5: 2, 0.25: 1}) == pytest.approx(1 / 16)
+    assert at_least(0, {}) == 1.0
