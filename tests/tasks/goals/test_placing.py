@@ -1,121 +1,29 @@
-"""Objects brought into regions, a container or a guarded strip, and arranged in rows and towers."""
+"""Placing, clicking and remembering: what the cases of `test_outcomes` do not tell apart."""
 
 from __future__ import annotations
 
-import math
+from dataclasses import replace
 
 import pytest
-from snapshots_by_hand import held, kinds, play, snap
+from snapshots_by_hand import AWAY, TICK, held, kinds, play, snap
 
 from robospa.geometry import Pose, Vec3
-from robospa.tasks.events import outcome
+from robospa.tasks.events import Event, outcome
+from robospa.tasks.goals import memory
 from robospa.tasks.goals.checklist import Checklist
+from robospa.tasks.goals.clicks import ClickInOrder, PressCounts
 from robospa.tasks.goals.conditions import Container, Region
-from robospa.tasks.goals.placing import Destination, bring, bring_alone, collect, nest, row, stack
+from robospa.tasks.goals.counters import PressCounter
+from robospa.tasks.goals.placing import collect, gather, nest, row, stack
 from robospa.tasks.snapshot import Snapshot
-from robospa.workcell import TABLE_TOP
 
 Places = dict[str, Vec3]
-DONE, UNDONE = "subtask_done", "subtask_undone"
-
-# Regions
-
-RIGHT, LEFT = Region(x=(0.1, math.inf)), Region(x=(-math.inf, -0.1))
-START: Places = {"a": (0.0, 0.05, 0.755), "b": (0.03, -0.1, 0.755)}
-APART: Places = {"a": (0.17, 0.05, 0.755), "b": (-0.17, -0.1, 0.755)}
-
-
-def sides(released: bool = False) -> Checklist:
-    parts = [Destination("a", (RIGHT,), (LEFT,)), Destination("b", (LEFT,), (RIGHT,))]
-    return bring(parts, TABLE_TOP, released)
-
-
-@pytest.mark.parametrize(
-    ("steps", "found"),
-    [
-        ([START], []),
-        ([{**START, "b": APART["b"]}, APART], [DONE, DONE, "success"]),
-        ([{**START, "a": (0.1, 0.0, 0.755)}], [DONE]),  # the edge belongs to it
-        ([{**START, "a": APART["a"]}, START], [DONE, UNDONE]),
-        ([{**START, "a": (-0.2, 0.0, 0.755)}, APART], [DONE, DONE, "success"]),  # astray first
-        ([{**APART, "a": (0.7, 0.0, 0.3)}], ["dropped", DONE]),  # off the table
-    ],
-)
-def test_each_in_its_region(steps: list[Places], found: list[str]) -> None:
-    assert kinds(play(sides(), START, *steps)) == found
-
-
-def test_the_other_side_and_a_fall_are_noted() -> None:
-    tracker = sides()
-    play(tracker, START, {**START, "a": (-0.2, 0.0, 0.755)}, {**APART, "a": (0.7, 0.0, 0.3)})
-    found = tracker.diagnostics()
-    assert (found["astray"], found["fallen"], found["idle_progress"]) == (1, 1, 0.0)
-
-
-def test_a_carried_object_counts_only_after_release() -> None:
-    flying = {**START, "a": (0.2, 0.05, 0.85)}
-    carried = snap(0, flying, (0.1, 1.0), held(flying["a"]))
-    assert DONE not in kinds(play(sides(), START, carried))
-    assert kinds(play(sides(), START, carried, snap(0, APART, grasp=held(APART["a"]))))[-1] == (
-        "success"
-    )
-
-
-@pytest.mark.parametrize(("released", "ends"), [(False, True), (True, False)])
-def test_success_waits_for_open_grippers_where_asked(released: bool, ends: bool) -> None:
-    closed = snap(0, APART, (0.3, 1.0))
-    assert ("success" in kinds(play(sides(released), START, closed))) is ends
-
-
-THERE: Vec3 = (0.0, -0.15, 0.758)
-
-
-@pytest.mark.parametrize(
-    ("where", "gripper", "found"),
-    [
-        (THERE, (0.1, 1), []),
-        (THERE, (1, 1), [DONE, "success"]),
-        ((0.06, -0.15, 0.758), (1, 1), []),
-        ((0, -0.07, 0.758), (1, 1), []),
-        ((0, -0.15, 0.85), (1, 1), []),
-    ],
-)
-def test_a_single_block_is_let_go_in_the_near_middle(
-    where: Vec3, gripper: tuple[float, float], found: list[str]
-) -> None:
-    tracker = bring_alone("a", Region((-0.05, 0.05), (-1.0, -0.08)))
-    events = play(tracker, {"a": (0.2, 0.0, 0.758)}, snap(0, {"a": where}, gripper))
-    assert [k for k in kinds(events) if k != "dropped"] == found
 
 
 # A container
 
 BIN = Container(Pose((-0.45, 0.0, 0.0)), (0.15, 0.15), 0.6)
 TABLE: Places = {"p": (0.0, 0.1, 0.74), "q": (0.2, 0.1, 0.74)}
-IN: Vec3 = (-0.45, 0.02, 0.05)
-INSIDE, PUSHED = dict(TABLE, p=IN), dict(TABLE, p=(-0.40, 0.0, 0.05))
-
-
-def fall(x: float, *heights: float) -> list[Places]:
-    return [dict(TABLE, p=(x, 0.0, z)) for z in heights]
-
-
-@pytest.mark.parametrize(
-    ("steps", "found"),
-    [
-        ([INSIDE, INSIDE, dict(INSIDE, q=IN), dict(INSIDE, q=IN)], [DONE, DONE, "success"]),
-        (fall(-0.45, 0.59, 0.54, 0.48, 0.41), []),  # through the opening
-        (fall(-0.25, 0.9, 0.5, 0.3, 0.02, 0.02, 0.02), ["dropped"]),  # beside the bin, once
-        (fall(-0.45, 0.61, 0.61, 0.61), []),  # on the rim
-        ([INSIDE, INSIDE, TABLE], [DONE, UNDONE]),
-        ([INSIDE, INSIDE, PUSHED], [DONE]),
-    ],
-)
-def test_objects_at_rest_in_the_bin(steps: list[Places], found: list[str]) -> None:
-    tracker = collect(["p", "q"], BIN, lost_below=0.64)
-    events = play(tracker, TABLE, *steps)
-    assert kinds(events) == found
-    assert tracker.diagnostics()["lost"] == found.count("dropped")
 
 
 def carried(p: Vec3, opening: float) -> Snapshot:
@@ -141,51 +49,12 @@ def test_walls_turn_with_the_container() -> None:
 MIXED: Places = {"a": (0.2, 0.0, 0.76), "b": (0.0, -0.05, 0.76), "c": (-0.2, 0.04, 0.76)}
 
 
-def lined(a: float, b: float, c: float, /, **other: Vec3) -> Places:
-    """A row at these x [m], with other places of some."""
-    return {n: (x, -0.17, 0.76) for n, x in (("a", a), ("b", b), ("c", c))} | other
-
-
-SLOPE = {"a": (-0.1, -0.2, 0.76), "b": (0.0, -0.171, 0.76), "c": (0.1, -0.142, 0.76)}
-
-
-@pytest.mark.parametrize(
-    ("scene", "done"),
-    [
-        (MIXED, 1),  # the first is free
-        (lined(-0.1, 0.0, 0.1), 3),
-        (SLOPE, 3),
-        (lined(0.1, 0.0, -0.1), 1),
-        (lined(-0.1, 0.1, 0.0), 2),
-        (lined(0.0, 0.0, 0.1), 2),
-        (lined(-0.1, 0.0, 0.1, b=(0.0, -0.135, 0.76)), 1),  # too far apart in depth
-        (lined(-0.01, 0.0, 0.1, b=(0.0, -0.17, 0.79)), 1),  # on top of each other
-    ],
-)
-def test_what_is_a_row(scene: Places, done: int) -> None:
-    events = play(row("abc", True), MIXED, scene)
-    assert outcome(events, 3).done == done
-    assert ("success" in kinds(events)) is (done == 3)
-
-
 def test_pairs_in_place_by_chance_count_and_are_told_apart() -> None:
     for a, idle, chance in ((MIXED["a"], 1 / 3, 0), ((-0.1, -0.04, 0.76), 2 / 3, 1)):
         tracker = row("abc", True)
         play(tracker, {**MIXED, "a": a}, {**MIXED, "a": a})
         found = tracker.diagnostics()
         assert found["idle_progress"] == pytest.approx(idle) and found["chance_pairs"] == chance
-
-
-def test_a_pair_counts_only_after_release_and_is_lost_when_a_block_leaves() -> None:
-    placed = lined(-0.1, 0.0, 0.1)
-    holding = snap(0, placed, (0.1, 1.0), held(placed["c"]))
-    closed = snap(0, placed, (0.5, 1.0))
-    assert outcome(play(row("abc", True), MIXED, holding), 3).done == 2
-    assert "success" not in kinds(play(row("abc", True), MIXED, holding, closed))
-    assert kinds(play(row("abc", True), MIXED, holding, closed, placed))[-1] == "success"
-    two = {**placed, "c": MIXED["c"]}
-    result = outcome(play(row("abc", True), MIXED, two, {**two, "b": MIXED["b"]}), 3)
-    assert (result.done, result.best) == (1, 2)
 
 
 def test_every_part_has_its_pairs() -> None:
@@ -213,52 +82,6 @@ def stacked(order: str = "abc") -> Checklist:
     return stack(order, [H] * len(order))
 
 
-OFF = [(0.026, 0, 0), (0, 0.026, 0), (0, 0, 0.021), (0, 0, -0.021)]
-WITHIN = [(0.024, 0, 0), (0, -0.024, 0), (0, 0, 0.019)]
-
-
-@pytest.mark.parametrize(
-    ("steps", "done", "best"),
-    [
-        ([GROUND], 1, 1),
-        ([tower("a", "b"), tower("a", "b", "c")], 3, 3),
-        ([tower("a", "c"), tower("a", "c", "b")], 1, 1),
-        ([tower("a", "b"), GROUND], 1, 2),  # a collapse takes it away
-        *(([tower("a", "b", shift=shift)], 1, 1) for shift in OFF),
-        *(([tower("a", "b", shift=shift)], 2, 2) for shift in WITHIN),
-    ],
-)
-def test_what_is_a_tower(steps: list[Places], done: int, best: int) -> None:
-    tracker = stacked()
-    result = outcome(play(tracker, GROUND, *steps), 3)
-    assert (result.success, result.done, result.best) == (done == 3, done, best)
-    found = tracker.diagnostics()
-    assert (found["idle_progress"], found["out_of_order"]) == (pytest.approx(1 / 3), 0)
-
-
-def test_a_held_block_counts_only_after_release() -> None:
-    scene = tower("a", "b")
-    grip = held(scene["b"])
-    steps = [snap(0, scene, (0.3, 1), grip), snap(0, scene, (0.9, 1), grip)]
-    assert kinds(play(stacked("ab"), GROUND, steps[0])) == [DONE, "grasped"]
-    assert kinds(play(stacked("ab"), GROUND, *steps))[-2:] == [DONE, "success"]
-
-
-def test_bringing_the_next_block_does_not_undo_the_one_below() -> None:
-    two = tower("a", "b")
-    near = snap(0, two, (0, 1), held((0.0, -0.13, 0.758 + 1.5 * H)))
-    assert UNDONE not in kinds(play(stacked(), GROUND, two, near))
-
-
-def test_a_block_stacked_before_the_one_below_is_noted() -> None:
-    # c hangs in the right place (say, on something foreign) while b is still missing
-    floating = dict(GROUND, b=(0.024, -0.13, 0.758), c=(0.0, -0.13, 0.758 + 2 * H))
-    tracker = stacked()
-    events = play(tracker, GROUND, floating)
-    assert [e.kind for e in events if e.object == "c"] == ["wrong_order", DONE]
-    assert tracker.diagnostics()["out_of_order"] == 1
-
-
 # Vessels
 
 BOWLS: Places = {
@@ -280,26 +103,6 @@ def nested(*names: str, shift: Vec3 = (0.0, 0.0, 0.0), **other: Vec3) -> Places:
     return found | other
 
 
-BESIDE_PLATE = [(0.051, 0, 0), (0, -0.051, 0)]
-BESIDE_BOWL = [(0.041, 0, 0), (0, 0.041, 0), (0, 0, 0.061), (0, 0, -0.016)]
-
-
-@pytest.mark.parametrize(
-    ("steps", "done", "best"),
-    [
-        ([BOWLS], 0, 0),
-        *(([nested(*o[: i + 1]) for i in range(3)], 3, 3) for o in ("abc", "cab", "bca")),
-        *(([nested("a", shift=shift)], 0, 0) for shift in BESIDE_PLATE),
-        *(([nested("a", "b", shift=shift)], 1, 1) for shift in BESIDE_BOWL),
-        ([nested(a=(0.06, -0.12, 0.745), b=(0.14, -0.12, 0.745))], 1, 1),  # side by side
-        ([nested("a", "b"), BOWLS], 0, 2),
-    ],
-)
-def test_what_is_a_stack_of_bowls(steps: list[Places], done: int, best: int) -> None:
-    result = outcome(play(nest("abc", "p"), BOWLS, *steps), 3)
-    assert (result.success, result.done, result.best) == (done == 3, done, best)
-
-
 def test_bowls_count_after_release_and_success_waits_for_open_grippers() -> None:
     holding = snap(0, nested("a"), (0.1, 1), held((0.15, -0.12, 0.78)))
     assert outcome(play(nest("abc", "p"), BOWLS, holding), 3).done == 0
@@ -311,3 +114,95 @@ def test_bowls_count_after_release_and_success_waits_for_open_grippers() -> None
         closed = snap(0, scene, (1.0, 0.5))
         assert "success" not in kinds(play(make(), start, closed))
         assert kinds(play(make(), start, closed, scene))[-1] == "success"
+
+
+# ---- clicking in order, pressing by count, using a tool: what counts, what does not, what is noted
+
+
+PLACES: dict[str, Vec3] = {"a": (-0.2, 0.0, 0.74), "b": (-0.1, 0.0, 0.74), "c": (0.0, 0.1, 0.74)}
+TOP = Pose((0.0, 0.0, 0.04))
+
+
+def counter(name: str, closed: bool = True) -> PressCounter:
+    return PressCounter(name, TOP, arm=0 if closed else None)
+
+
+def touching(names: str, opening: float = 0.0, instants: int = 3) -> list[Snapshot]:
+    """A touch of each named object in turn, each followed by 0.2 s without one."""
+    made = [snap(0, PLACES)]
+    for name in names:
+        x, y, z = PLACES[name]
+        contact = [(name, (x, y, z + 0.04))]
+        made += [snap(0, PLACES, (opening, 1.0), AWAY, contact)] * instants
+        made += [snap(0, PLACES, (opening, 1.0))] * 10
+    return made
+
+
+def test_diagnostics_count_what_went_wrong() -> None:
+    tracker = ClickInOrder([counter("a"), counter("b")], [counter("c")])
+    play(tracker, *touching("bcaa"))
+    found = tracker.diagnostics()
+    assert (found["out_of_order"], found["wrong_clicks"], found["repeated_clicks"]) == (1, 1, 1)
+    assert (found["presses"], found["idle_progress"]) == (4, 0.0)
+
+
+# Counts
+
+
+def press(times: tuple[int, ...], touched: str) -> tuple[PressCounts, list[Event]]:
+    tracker = PressCounts([counter(n, closed=False) for n in "ab"], times)
+    return tracker, play(tracker, *touching(touched, opening=1.0))
+
+
+@pytest.mark.parametrize(
+    ("touched", "done", "out_of_order", "excess"),
+    [("aab", 2, 0, 0), ("baa", 2, 1, 0), ("aba", 2, 1, 0), ("ab", 1, 1, 0), ("aaaba", 1, 1, 2)],
+)
+def test_exact_counts_in_any_order(touched: str, done: int, out_of_order: int, excess: int) -> None:
+    tracker, events = press((2, 1), touched)
+    result = outcome(events, 2)
+    assert (result.success, result.failed, result.done) == (done == 2, False, done)
+    found = tracker.diagnostics()
+    assert (found["out_of_order"], found["excess_presses"]) == (out_of_order, excess)
+
+
+# -------- memory goals: stillness before the cue is hidden; gathering, turning, uncovering after it
+
+
+STRIP = Region((-0.26, 0.26), (-1.0, -0.11))
+SHOWN: dict[str, Vec3] = {"a": (-0.1, 0.0, 0.755), "b": (0.1, 0.0, 0.755), "x": (0.0, 0.05, 0.755)}
+WALL: dict[str, Vec3] = {"wall": (0.0, 0.12, 0.945)}
+NEAR: dict[str, Vec3] = {"a": (-0.1, -0.18, 0.755), "b": (0.1, -0.18, 0.755)}
+DONE, UNDONE = "subtask_done", "subtask_undone"
+
+
+def gathered(
+    *after: Snapshot, before: tuple[Snapshot, ...] = ()
+) -> tuple[memory.AfterCue, list[Event]]:
+    """Two blocks to bring and one to leave; `after` the wall has come."""
+    goal = memory.AfterCue(gather(["a", "b"], ["x"], STRIP), ["wall"])
+    return goal, play(goal, SHOWN, *before, {**SHOWN, **WALL}, *after)
+
+
+def there(*names: str, z: float = 0.755, gripper: float = 1.0, **elsewhere: Vec3) -> Snapshot:
+    """The named blocks in the strip, the left arm around the last one if it is not open."""
+    moved = {n: (NEAR[n][0], NEAR[n][1], z) for n in names}
+    grasp = held(moved[names[-1]]) if names and gripper < 1 else AWAY
+    return snap(0, {**SHOWN, **WALL, **moved, **elsewhere}, (gripper, 1.0), grasp)
+
+
+@pytest.mark.parametrize(
+    ("steps", "found"),
+    [
+        ([there("a"), there("a", "b")], [DONE, DONE, "success"]),
+        ([there("a", gripper=0.1)], []),
+        ([there("a", z=0.80)], []),
+        ([replace(there("a", "b"), gripper=(0.1, 1.0))], [DONE, DONE]),
+        ([there("a"), there()], [DONE, UNDONE]),
+        ([there("a"), there("a", x=(0.0, -0.12, 0.9)), there("a", "b")], [DONE, "failed"]),
+    ],
+)
+def test_shown_blocks_in_the_strip(steps: list[Snapshot], found: list[str]) -> None:
+    goal, events = gathered(*steps)
+    assert kinds(events) == ["cue_hidden", *found]
+    assert goal.diagnostics()["cue_hidden_at"] == TICK
