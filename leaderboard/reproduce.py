@@ -188,10 +188,12 @@ def plan(valid: Valid, trials: int | None, alpha: float = 0.01) -> int:
             f"{trials} hidden trials a variant are too few: {needed} notice a lie of "
             f"{100 * LIE:g} points with {100 * LEAST_POWER:g} %"
         )
+    if trials is not None:
+        return trials
     found, level = _cells(valid, alpha)
     categories = [[claims[v] for v in own] for place, own in found.items() if place in RANKED_ROWS]
     more = [trials_needed(own, level, CELL_LIE) or 0 for own in categories]
-    return trials or max(needed, *more, 0)
+    return max(needed, *more, 0)
 
 
 def _cells(valid: Valid, alpha: float) -> tuple[dict[str, tuple[str, ...]], float]:
