@@ -60,7 +60,7 @@ def _files(folder: Path) -> set[str]:
 def test_the_source_archive_is_the_repository(unpacked: Path) -> None:
     made = {"PKG-INFO", "setup.cfg"}
     assert _files(unpacked) - made == _files(unpacked.parents[1] / "tree")
-    for name in ("docs/runs.md", "tests/harness/test_selection.py", "scripts/setup.sh", "Makefile"):
+    for name in ("docs/runs.md", "tests/harness/test_settings.py", "scripts/setup.sh", "Makefile"):
         assert (unpacked / name).is_file(), name
     links = {link.name for link in (ROOT / "robospa").iterdir() if link.is_symlink()}
     assert {link.name for link in (unpacked / "robospa").iterdir() if link.is_symlink()} == links
