@@ -3,10 +3,11 @@
 It proves that a trial can be solved and shows what the harness looks like when it is. Its
 numbers are an upper bound of the setup, never a policy's result.
 
-`FailingOracle` has another plan (`robospa.harness.demonstrations.mistakes`): it fails on purpose,
-in one known way, which the failure analysis is measured on.
+`FailingOracle` has another plan (`robospa.harness.demonstrations.changed_plans`): it fails on
+purpose, in one known way, which the failure analysis is measured on; or in many, as a model may.
 
     robospa serve mistakes --arg kind=neighbour
+    robospa serve mistakes --arg kind=all
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.harness.demonstrations.changed_plans import KINDS, ChangedExpert, wrong_plan
+from robospa.harness.demonstrations.changed_plans import KINDS, ChangedExpert, occasions, wrong_plan
 from robospa.harness.robots import embodiment
 from robospa.harness.skills import Expert
 from robospa.observation import Observation
@@ -87,20 +88,42 @@ def create(salt: str = "") -> Oracle:
     return Oracle(salt)
 
 
+ALL = "all"
+"""The mistake of a policy that makes now this one, now that, and sometimes none."""
+TYPICAL = ("neighbour", "", "drops", "swaps", "stops", "beside", "forgets", "repeats")
+"""Its mistakes, "" for none; those of the paper's analysis (section 5): wrong target, handling,
+lost track, memory."""
+
+
 class FailingOracle(Oracle):
-    """Makes one mistake, the same one in every trial; where a task has no occasion, it holds."""
+    """Makes one mistake, the same one in every trial; where a task has no occasion, it holds.
+
+    ALL takes another in every trial, by its policy seed, of those that the scene has occasion for.
+    """
 
     def __init__(self, kind: str) -> None:
         super().__init__()
-        if kind not in KINDS:
-            raise ValueError(f"no mistake {kind!r}; there are {', '.join(KINDS)}")
+        if kind not in (*KINDS, ALL):
+            raise ValueError(f"no mistake {kind!r}; there are {', '.join(KINDS)}, {ALL}")
         self.kind = kind
         self.spec = replace(Oracle.spec, name=f"mistakes:{kind}")
         self.applies = True
+        self._seed = 0
+
+    def reset(self, trial: TrialInfo) -> None:
+        """Build the scene of `trial`; ValueError without its key."""
+        super().reset(trial)
+        self._seed = trial.policy_seed
 
     def _planned(self, scene: Scene, snapshot: Snapshot) -> Expert:
+        kind = self.kind
+        if kind == ALL:
+            some = [one for one in TYPICAL if one in ("", *occasions(scene))]
+            kind = some[self._seed % len(some)]
+        if not kind:
+            return Expert(scene, snapshot)
         try:
-            plan, self.applies = wrong_plan(self.kind, scene), True
+            plan, self.applies = wrong_plan(kind, scene), True
         except ValueError:
             plan, self.applies = (), False
         return ChangedExpert(scene, snapshot, plan)

@@ -209,10 +209,12 @@ class Recording:
 
     video: str = option(
         "none",
-        "which trials to film: none, failures, first (of each task), all",
+        "trials to film: none, failures (three of each task and type), first (of each task), all",
         VIDEO,
     )
-    video_cameras: str = option("head", f"what films show side by side, of {', '.join(CAMERAS)}")
+    video_cameras: str = option(
+        "third,head", f"what films show, the first large, of {', '.join(CAMERAS)}"
+    )
     log: str = option("none", "also log the run to: wandb, or wandb:PROJECT")
 
     @property

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from robospa.harness.demonstrations.demonstration import demonstrate
 from robospa.harness.pictures.video import FPS, FilmRecorder
 from robospa.harness.world import World
-from robospa.observation import CameraSpec
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.sentences import instruction
 from robospa.trial import REFERENCE, TrialKey
@@ -39,7 +38,7 @@ SHOWN = (
 ROBOTS = (REFERENCE, "franka-panda", "ur5-wsg", "piper", "ARX-X5")
 ROBOTS_TASK, TRIES = ("Stack_Blocks_Color_Order", 3), 10
 """What every robot does: three blocks, both arms; the first of so many scenes that it solves."""
-CAMERA = CameraSpec("third", 960, 720)
+CAMERA, DRAWN = "third", (960, 720)
 CUT, SIZE = (48, 90, 912, 606), (576, 344)
 """Left, top, right and bottom of what is shown of it [px]: the arms and most of the table; and its
 width and height in the film. Of the robots:"""
@@ -58,7 +57,7 @@ class Animation(FilmRecorder):
     """Keeps one of `every` frames of a trial as `drawn` makes a page of it."""
 
     def __init__(self, drawn: Callable[[Image.Image], Image.Image], every: int = 1) -> None:
-        super().__init__([CAMERA])
+        super().__init__((CAMERA,), DRAWN)
         self._page, self._every, self._count = drawn, every, 0
         self.frames: list[Image.Image] = []
 

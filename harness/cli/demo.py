@@ -1,8 +1,8 @@
-"""`robospa demo`: an oracle server on loopback, evaluated over the wire, ten tasks of the 56.
+"""`robospa demo`: two policy servers on loopback, evaluated over the wire in ten tasks of the 56.
 
-Shows the whole way in a minute or two: server, handshake, seeded trials, records, table, report
-with videos. The learned reference follows, if torch is installed and time is left, and shows how it
-fails; without torch arms that move at random, on some of the same trials.
+Shows the whole way in a minute or two: server, handshake, seeded trials, records, tables, films, a
+report. First a policy that makes the mistakes of the paper's analysis, then the expert in the same
+scenes, and one page of both.
 """
 
 from __future__ import annotations
@@ -14,13 +14,12 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Annotated
 
 import typer
 
-from robospa.harness.cli.options import PROCESSES, SECONDS, TRIALS
+from robospa.harness.cli.options import PROCESSES, TRIALS
 
 if TYPE_CHECKING:
     from robospa.harness.settings import Selection
@@ -40,35 +39,34 @@ def demo(
     tasks: Annotated[
         str, typer.Option(help="as in `robospa eval`; `sample` is one of each category")
     ] = "sample",
-    levels: Annotated[str, typer.Option(help="such as 1,3-5")] = "1,3,5",
+    levels: Annotated[str, typer.Option(help="such as 1,3-5")] = "1,3",
     trials: Annotated[int, typer.Option(callback=TRIALS, help="trials per variant")] = 1,
     workers: Annotated[
         int, typer.Option(callback=PROCESSES, help="worker processes; 0 for one per core")
     ] = 0,
-    video: Annotated[str, typer.Option(help="as in `robospa eval`")] = "first",
-    contrast: Annotated[bool, typer.Option(help="also evaluate the learned policy")] = True,
-    seconds: Annotated[
-        float, typer.Option(callback=SECONDS, help="leave the contrast out after that time")
-    ] = 75.0,
+    video: Annotated[
+        str, typer.Option(help="of the mistakes, as in `robospa eval`; the expert's are `first`")
+    ] = "failures",
 ) -> None:
-    """See a policy server evaluated: trials of each category, a table, a report with videos."""
+    """See two policies evaluated over the wire: tables, and a report of both with films."""
     from robospa.harness.running.request import new_folder
     from robospa.harness.selection import parse_levels, parse_tasks
+    from robospa.results.records.runs import read_run
+    from robospa.results.report.page import write_report
+    from robospa.results.report.report import make_report
 
     started = time.monotonic()
     folder = out or new_folder("demo")
     names = parse_tasks(",".join(SAMPLE) if tasks == "sample" else tasks)
-    page = _evaluate("oracle", _select(names, levels, trials), folder / "oracle", workers, video)
-    # At random the tasks with the shortest trials: one pick each.
-    learned = find_spec("torch") is not None
-    short = names if learned else [name for name in names if name in parse_tasks("spatial")]
-    if contrast and short and time.monotonic() - started < seconds:
-        chosen = _select(short, str(max(parse_levels(levels))), trials)
-        policy, what = (
-            ("learned", "the learned reference") if learned else ("random", "random motion")
-        )
-        print(f"\nFor contrast, some of the same trials with {what}:")
-        _evaluate(policy, chosen, folder / policy, workers, video if learned else "none")
+    parse_levels(levels)
+    chosen = _select(names, levels, trials)
+    runs = {"mistakes": (["--arg", "kind=all"], video), "oracle": ([], "first")}
+    for policy, (options, films) in runs.items():
+        if video == "none":
+            films = video
+        _evaluate(policy, options, chosen, folder / policy, workers, films)
+    report = make_report([read_run(folder / policy) for policy in runs])
+    page = write_report(report, folder / "report") / "report.html"
     print(f"\nDone in {time.monotonic() - started:.0f} s. Open {page} in a browser.")
 
 
@@ -84,17 +82,16 @@ def _select(names: Sequence[str], levels: str, trials: int) -> Selection:
     return shipped
 
 
-def _evaluate(policy: str, chosen: Selection, folder: Path, workers: int, video: str) -> Path:
-    """Serve `policy`, evaluate it over the wire, print its table; returns the report's page."""
+def _evaluate(
+    policy: str, options: list[str], chosen: Selection, folder: Path, workers: int, video: str
+) -> None:
+    """Serve `policy`, evaluate it over the wire, print its table."""
     from robospa.harness.cli.eval import run_and_show
     from robospa.harness.running.request import make_request
     from robospa.harness.settings import Compute, Connection, EvaluationSettings, Recording
-    from robospa.results.records.runs import read_run
-    from robospa.results.report.page import write_report
-    from robospa.results.report.report import make_report
 
-    with server(policy) as url:
-        print(f"`robospa serve {policy}` listens at {url}; evaluating it over the wire", flush=True)
+    with server(policy, *options) as url:
+        print(f"\n`robospa serve {policy}` listens at {url}; it is evaluated:", flush=True)
         settings = EvaluationSettings(
             policy=(url,),
             out=folder,
@@ -104,13 +101,13 @@ def _evaluate(policy: str, chosen: Selection, folder: Path, workers: int, video:
             recording=Recording(video=video),
         )
         run_and_show(make_request(settings, arguments={"command": "demo"}))
-    return write_report(make_report(read_run(folder)), folder / "report") / "report.html"
 
 
 @contextmanager
-def server(policy: str) -> Iterator[str]:
+def server(policy: str, *options: str) -> Iterator[str]:
     """`robospa serve POLICY` in a process of its own on a free port of loopback; yields the URL."""
-    words = [sys.executable, "-m", "robospa.harness.cli.main", "serve", policy, "--port", "0"]
+    command = [sys.executable, "-m", "robospa.harness.cli.main", "serve"]
+    words = [*command, policy, "--port", "0", *options]
     with tempfile.TemporaryFile("w+") as output:
         process = subprocess.Popen(words, stdout=output, stderr=subprocess.STDOUT)
         try:

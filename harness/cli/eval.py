@@ -116,7 +116,7 @@ def run_and_show(request: Request, *, as_json: bool = False) -> None:
         print_json({"folder": folder, **run_data(run)})
     else:
         for part in by_setting(run):
-            print_scores(part, results_of_run(part))
+            print_scores(part, results_of_run(part), beside=False)
     if run.missing:
         print(
             f"robospa: {len(run.missing)} of {len(run.keys)} trials could not be run and are "

@@ -77,7 +77,7 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         control: str = "rest_to_rest",
         step_scale: float = 1.0,
         render_mode: str | None = None,
-        render_camera: str = "head",
+        render_camera: str = "third",
         render_size: tuple[int, int] = (640, 480),
         world: str = SAPIEN_NAME,
         parts: str = TASK_PARTS,

@@ -87,7 +87,7 @@ class RoboSPAEnv(BaseEnv):
         sim_backend: str = "auto",
         render_backend: str = "cpu",
         cameras: Sequence[str] = USUAL_CAMERAS,
-        render_camera: str = "head",
+        render_camera: str = "third",
         mode: str = "clean",
         split: str = "heldout",
         seeds: Sequence[int] | None = None,

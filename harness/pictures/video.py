@@ -26,16 +26,20 @@ FPS = 10
 """Frames per second of a video."""
 EVERY = 0.2
 """Simulated seconds between two frames."""
-CAMERA = "head"
-"""What a film shows if nobody asks for more."""
+CAMERAS = ("third", "head")
+"""What a film shows if nobody asks for others: the robot from the front, and what it sees."""
+SIZE, INSET = (480, 360), (160, 120)
+"""Width and height of the first camera's picture, and of the others' [px]."""
 
 
 class FilmRecorder:
-    """A `Recorder` that draws a trial while it is played, all `cameras` side by side, as an H.264
-    file that grows in memory. While nothing moves, one picture serves for all."""
+    """A `Recorder` that draws a trial while it is played, as an H.264 file that grows in memory:
+    the first camera in `size`, with the others at its left edge. While nothing moves, one picture
+    serves for all."""
 
-    def __init__(self, cameras: Sequence[CameraSpec] = (CameraSpec(CAMERA),)) -> None:
-        self._cameras = tuple(cameras)
+    def __init__(self, cameras: Sequence[str] = CAMERAS, size: tuple[int, int] = SIZE) -> None:
+        sizes = [size, *[INSET] * (len(cameras) - 1)]
+        self._cameras = [CameraSpec(name, *each) for name, each in zip(cameras, sizes, strict=True)]
         self._bytes = io.BytesIO()
         self._file: Any = None
         self._stream: Any = None
@@ -86,7 +90,10 @@ class FilmRecorder:
         still = world.still()
         if self._drawn is None or still != self._drawn:
             self._drawn = still
-            self._image = np.hstack(still.draw(self._cameras))
+            first, *others = still.draw(self._cameras)
+            self._image = first.copy()
+            for picture, top in zip(others, range(0, SIZE[1], INSET[1]), strict=False):
+                self._image[top : top + len(picture), : picture.shape[1]] = picture
         for _ in range(frames):
             self.add(self._image)
 
@@ -98,11 +105,11 @@ def film(
     *,
     parts: Callable[[TrialKey], TrialSetup] = task_parts,
     step_scale: float = 1.0,
-    cameras: Sequence[str] = (CAMERA,),
+    cameras: Sequence[str] = CAMERAS,
 ) -> bytes:
-    """An MP4 of the finished trial of `record`, replayed from the run in `folder`, `cameras` side
-    by side. Raises what `replay_record` raises: a replay that ends otherwise is not filmed.
+    """An MP4 of the finished trial of `record`, replayed from the run in `folder`, as `cameras`
+    show it. Raises what `replay_record` raises: a replay that ends otherwise is not filmed.
     """
-    recorder = FilmRecorder([CameraSpec(name) for name in cameras])
+    recorder = FilmRecorder(cameras)
     replay_record(world, record, folder, recorder, parts=parts, step_scale=step_scale)
     return recorder.finish()

@@ -11,7 +11,8 @@ import contextlib
 import os
 import time
 import traceback
-from collections.abc import Callable, Iterable, Mapping
+from collections import Counter
+from collections.abc import Callable, Container, Iterable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 from itertools import count
@@ -33,7 +34,7 @@ from robospa.harness.settings import FILE, Recording, SettingsError, read_settin
 from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS, open_world
 from robospa.results.failures.labels import label
 from robospa.results.records.manifest import RunError
-from robospa.results.records.runs import Run, film_name, films_in, finished, owed_films
+from robospa.results.records.runs import Run, film_name, films_in, finished
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
@@ -51,6 +52,8 @@ LONGEST = 1800.0
 CRASHES = 3
 """After so many processes in a row that died over their films no more are made."""
 POLL_SECONDS = 0.5
+MOST_ALIKE = 3
+"""With video "failures" so many films are made of the failures of one type at one task."""
 
 
 class FilmsInterrupted(KeyboardInterrupt):
@@ -148,6 +151,7 @@ class Films:
         )
         self._jobs: dict[Future[FilmDone], TrialRecord] = {}
         self._crashes = 0
+        self._alike: Counter[tuple[str, str]] = Counter()
         self.made = 0
         self.failed = 0
         self.troubles: list[str] = []
@@ -159,10 +163,17 @@ class Films:
         """Films that are waiting or being made."""
         return len(self._jobs)
 
-    def add(self, records: Iterable[TrialRecord]) -> None:
-        """Film `records` in their order, after those that wait."""
+    def add(self, records: Iterable[TrialRecord], there: Container[str] = ()) -> None:
+        """Film `records` in their order, after those that wait, but for the films that are `there`
+        and failures of which enough are filmed."""
         for record in records:
-            self._jobs[self._pool.submit(record)] = record
+            failure = label(record) if self.config.video == "failures" else None
+            if failure is not None:
+                self._alike[record.key.task, failure.kind] += 1
+                if self._alike[record.key.task, failure.kind] > MOST_ALIKE:
+                    continue
+            if film_name(record.key) not in there:
+                self._jobs[self._pool.submit(record)] = record
 
     def poll(self) -> None:
         """Take what was made; returns at once."""
@@ -214,7 +225,8 @@ def films_of(config: WorkerConfig, known: Mapping[TrialKey, TrialRecord], worker
     """The films of a run: those that its `known` trials lack, unless it wants none now."""
     films = Films(config, workers)
     if config.video != "none":
-        films.add(owed_films(config.folder, known.values()))
+        wanted = [r for r in known.values() if r.video == film_name(r.key)]
+        films.add(wanted, films_in(config.folder))
     return films
 
 

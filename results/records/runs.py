@@ -287,12 +287,6 @@ def films_in(folder: Path) -> frozenset[str]:
         return frozenset()
 
 
-def owed_films(folder: Path, records: Iterable[TrialRecord]) -> list[TrialRecord]:
-    """Those of `records` whose film the run in `folder` wants and does not have."""
-    there = films_in(folder)
-    return [r for r in records if r.video == film_name(r.key) and r.video not in there]
-
-
 LOCK = ".lock"
 """File of a run's folder that its driver holds a lock on."""
 

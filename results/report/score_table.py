@@ -130,11 +130,12 @@ BESIDE = (grounding_table, comparable_table)
 """Tables that a report has beside the paper's."""
 
 
-def print_scores(run: Run, results: ModelResults) -> None:
-    """Print the tables of `run` on the terminal: how its trials ended, why some are missing, are
-    policy errors or were repeated, which actions could not be executed as they were sent."""
+def print_scores(run: Run, results: ModelResults, beside: bool = True) -> None:
+    """Print the scores of `run` on the terminal: how its trials ended, why some are missing, are
+    policy errors or were repeated, which actions could not be executed as they were sent; `beside`:
+    the smaller tables, too."""
     scores = results.scores
-    for table in (score_table(run, scores), *(of([results]) for of in BESIDE)):
+    for table in (score_table(run, scores), *(of([results]) for of in BESIDE if beside)):
         if table is not None:
             show(table)
     console = plain_console(wide=130)

@@ -276,3 +276,19 @@ def test_a_scripted_mistake_is_labelled_as_scripted(kind: str, name: str, expect
     world.close()
     assert policy.applies and found is not None
     assert found.kind == expected
+
+
+@pytest.mark.sim
+def test_one_that_makes_all_mistakes_makes_another_in_every_trial() -> None:
+    from robospa.harness.sim.sapien_world import SapienWorld
+    from robospa.harness.trial import run_trial
+
+    world, policy, key = (
+        SapienWorld(render=False),
+        create_failing("all"),
+        TrialKey("Pick_Blocks_Size", 2, 930_000),
+    )
+    found = [label(run_trial(world, policy, key, policy_seed=seed)) for seed in range(3)]
+    world.close()
+    kinds = [failure and failure.kind for failure in found]
+    assert kinds == ["target_grounding", None, "target_execution"]

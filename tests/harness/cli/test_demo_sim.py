@@ -15,14 +15,15 @@ pytestmark = [
 ]
 
 
-def test_the_demo_leaves_a_report_with_a_film(
+def test_the_demo_leaves_a_page_of_mistakes_and_expert_with_films(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["demo", "--tasks", "Pick_Blocks_Size", "--levels", "1", "--no-contrast"]
+    words = ["demo", "--tasks", "Pick_Blocks_Size", "--levels", "1", "--workers", "1"]
     with pytest.raises(SystemExit) as end:
-        main([*words, "--workers", "1", "--out", str(tmp_path / "demo")])
+        main([*words, "--video", "all", "--out", str(tmp_path / "demo")])
     assert end.value.code == 0
     assert "Pick Blocks Size" in capsys.readouterr().out
-    report = tmp_path / "demo" / "oracle" / "report"
-    assert len(list((report / "videos").glob("*.mp4"))) == 1
-    assert "<video" in (report / "report.html").read_text()
+    report = tmp_path / "demo" / "report"
+    assert len(list((report / "videos").rglob("*.mp4"))) == 2
+    page = (report / "report.html").read_text()
+    assert "<video" in page and "mistakes" in page and "oracle" in page

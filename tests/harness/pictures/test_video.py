@@ -64,7 +64,7 @@ class Counting(FakeWorld):
 
 
 def test_a_world_at_rest_is_drawn_once() -> None:
-    world, recorder = Counting(), FilmRecorder()
+    world, recorder = Counting(), FilmRecorder(("head",))
     recorder.started(world)
     for step in range(1, 101):
         world.steps = step

@@ -11,7 +11,7 @@ from robospa.harness.running.ray_executor import RayExecutor
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.settings import Compute
-from robospa.results.records.runs import VIDEOS, differences, owed_films, read_records
+from robospa.results.records.runs import VIDEOS, differences, film_name, read_records
 from robospa.trial import TrialKey
 
 pytest.importorskip("ray")
@@ -38,7 +38,7 @@ def test_records_of_a_cluster_equal_local_ones_and_the_cluster_ends_with_the_run
         assert (tmp_path / "here" / trace).read_bytes() == (tmp_path / "ray" / trace).read_bytes()
     # Nothing was drawn on the node: films are made where the run's folder is, from what came back.
     assert not (tmp_path / "ray" / VIDEOS).exists()
-    assert owed_films(tmp_path / "ray", ray.values()) == [ray[key] for key in KEYS]
+    assert [ray[key].video for key in KEYS] == [film_name(key) for key in KEYS]
     assert processes("raylet") <= before
 
 
