@@ -3,13 +3,15 @@
 The page is made again when records change, but takes a sixth of one core at most; nothing is
 written into the run's folder. The server listens on 127.0.0.1 only, answers only requests that name
 it so (a page from elsewhere cannot read it through another name), and serves two things: the page
-and the run's videos.
+and the run's videos. A button of that very page has a trial played in 3-D by a process of its own.
 """
 
 from __future__ import annotations
 
 import hashlib
 import re
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -32,6 +34,7 @@ PAUSE_FACTOR = 5.0
 """After the page was made it is not made again for so many times as long as that took."""
 FIGURES_SECONDS = 60.0
 """The figures are drawn no more often than that while the run goes on."""
+VIEWER_MINUTES = 120
 Inputs = tuple[tuple[str, int, int], ...]
 """Names, sizes [bytes] and times [ns] of the files that the page is made from."""
 
@@ -50,11 +53,37 @@ class LiveReport:
         self._earliest = 0.0
         self._drawings: list[DrawnFigure] = []
         self._drawn_at = -FIGURES_SECONDS
+        self._viewer: subprocess.Popen[str] | None = None
         self.read()
 
     def close(self) -> None:
-        """Remove the drawn figures."""
+        """Remove the drawn figures and end the viewer."""
+        if self._viewer is not None:
+            self._viewer.terminate()
+            self._viewer.wait()
         self._drawn_folder.cleanup()
+
+    def in_3d(self, trial: str) -> str:
+        """The address at which `trial` is played in 3-D from now on, in place of the one before;
+        raises RunError with the reason if it cannot be."""
+        with self._lock:
+            if self._viewer is not None:
+                self._viewer.terminate()
+                self._viewer.wait()
+            command = [sys.executable, "-m", "robospa", "view", "--minutes", f"{VIEWER_MINUTES}"]
+            self._viewer = subprocess.Popen(
+                [*command, "--", str(self.folder), trial],
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                text=True,
+            )
+            assert self._viewer.stdout is not None
+            said = ""
+            for line in self._viewer.stdout:
+                if found := re.search(r"is at (http://127\.0\.0\.1:\d+)", line):
+                    return found[1]
+                said = line
+            raise RunError(said.strip() or f"{trial} cannot be shown in 3-D")
 
     def read(self) -> tuple[bytes, str]:
         """The page as it is now, and a tag that changes with it; raises RunError."""
@@ -151,11 +180,32 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = 30
     protocol_version = "HTTP/1.0"
 
+    def _is_ours(self, name: str, start: str = "") -> bool:
+        """Whether the header `name` is this server's address; answers the request if not."""
+        port = self.server.server_port
+        if self.headers.get(name) in (f"{start}127.0.0.1:{port}", f"{start}localhost:{port}"):
+            return True
+        self._send_text(HTTPStatus.FORBIDDEN, "this server is for this machine only")
+        return False
+
+    def do_POST(self) -> None:
+        """A trial in 3-D, asked for by a button of the page itself."""
+        if not (self._is_ours("Host") and self._is_ours("Origin", "http://")):
+            return
+        start, _, trial = unquote(self.path).rpartition("/")
+        if start != "/3-D":
+            self._send_text(HTTPStatus.NOT_FOUND, "there is nothing of that name")
+            return
+        try:
+            address = self.server.report.in_3d(trial)
+        except RunError as error:
+            self._send_text(HTTPStatus.INTERNAL_SERVER_ERROR, str(error))
+            return
+        self._send_head(HTTPStatus.SEE_OTHER, "text/plain", 0, Location=address)
+
     def do_GET(self) -> None:
         """The page or a video."""
-        port = self.server.server_port
-        if self.headers.get("Host") not in (f"127.0.0.1:{port}", f"localhost:{port}"):
-            self._send_text(HTTPStatus.FORBIDDEN, "this server is for this machine only")
+        if not self._is_ours("Host"):
             return
         path = unquote(self.path.partition("?")[0])
         if path == "/":

@@ -17,6 +17,7 @@ from robospa.results.figures.series import (
     percent_of,
     plain,
     series_handles,
+    spread,
     whiskers,
 )
 from robospa.results.scoring.scores import Scores
@@ -88,7 +89,11 @@ def _level_panel(
         axis.plot(*zip(*chance, strict=True), ls=(0, (1, 2)), color=INK, lw=0.8)
     for index, series in enumerate(all_series):
         parts = [(n, a) for n in levels if (a := series.scores.categories.get((category, n)))]
-        points = [(n, e) for n, a in parts if (e := a.values.get("sr"))]
+        points = [
+            (n, e if spread(series.scores, category, n) else Estimate(e.value, e.value, e.value))
+            for n, a in parts
+            if (e := a.values.get("sr"))
+        ]
         if not points:
             continue
         aside = (index - (len(all_series) - 1) / 2) * min(0.09, 0.4 / len(all_series))

@@ -74,6 +74,13 @@ def percent_of(part: VariantScore | AverageScore | None, metric: str) -> float |
     return None if estimate is None else 100 * estimate.value
 
 
+def spread(scores: Scores, category: str, level: int) -> bool:
+    """Whether any variant of `category` at `level` has more than one trial: of one trial each, an
+    interval says nothing that is worth a whisker."""
+    cells = scores.cells.values()
+    return any(c.trials > 1 for c in cells if (c.category, c.level) == (category, level))
+
+
 def label_of(name: str, most: int = 44) -> str:
     """`name` as Matplotlib is to print it: one line, no longer than `most`, no mathematics."""
     text = "".join(c if c.isprintable() else " " for c in name)

@@ -9,29 +9,32 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Sequence
+import shlex
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from robospa.results.failures.labels import NAMES, SIMULATED_PER_FILM
-from robospa.results.figures.series import FORMATS, GRID, INK, DrawnFigure
+from robospa.results.figures.charts import chance_levels
+from robospa.results.figures.series import COLOURS, FORMATS, GRID, INK, DrawnFigure, spread
 from robospa.results.paper.origin import origin_of
 from robospa.results.records.action_problems import problem_data
 from robospa.results.records.manifest import departures
 from robospa.results.records.runs import Run
 from robospa.results.report.report import Report, draw_figures
-from robospa.results.report.run_card import about, ends, facts
+from robospa.results.report.run_card import about, ends, facts, headline
 from robospa.results.report.score_table import percent
 from robospa.results.report.tables import for_page, write_files
 from robospa.results.report.trials import failure_counts, trial_rows
 from robospa.results.scoring.comparable import comparable
 from robospa.results.scoring.grounding import grounding_data, records_of
+from robospa.results.scoring.models import ModelResults
 from robospa.results.scoring.scores import Scores, to_json
 from robospa.results.statistics.intervals import Estimate
 from robospa.results.tables import escape_markdown, to_markdown
-from robospa.trial import BASIC, CATEGORY_NAMES, DIMENSIONS, METRIC_NAMES
+from robospa.trial import BASIC, CATEGORIES, CATEGORY_NAMES, DIMENSIONS, METRIC_NAMES
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -39,16 +42,33 @@ if TYPE_CHECKING:
 FIGURES = "figures"
 
 
-@dataclass(frozen=True)
-class ScoreCard:
-    """A model's overall success rate with its interval, and `lines` below it, as text."""
+class ShownRate(NamedTuple):
+    """A rate of a card; `bar` has the value and the ends of its interval in percent, None without
+    results."""
 
     name: str
     value: str
     interval: str
-    lines: tuple[str, ...]
     bar: tuple[float, float, float] | None
-    """The value and the ends of its interval in percent; None without results."""
+
+
+@dataclass(frozen=True)
+class ScoreCard:
+    """A model's overall rates, official and by the first choice, and `lines` below them."""
+
+    name: str
+    rates: tuple[ShownRate, ...]
+    lines: tuple[str, ...]
+
+
+class Panel(NamedTuple):
+    """Success by level in a category as shapes in a field of 120 x 70: y is 10 for 100 %, 60 for 0.
+    `lines` have the paths of SR, its intervals and SR@1 of each model that has any."""
+
+    category: str
+    title: str
+    lines: tuple[tuple[int, str, str, str], ...]
+    chance: str
 
 
 @dataclass(frozen=True)
@@ -78,14 +98,15 @@ def page(
     runs, names = report.runs, [name for name, _ in report.named_runs]
     trials = trial_rows(runs, folder, report.failures)
     failures = failure_counts(report.failures)
-    listed = sum(len(run.keys) for run in runs)
+    sizes = [len(run.keys) for run in runs]
     sections = ["summary", "tables", "trials", "runs"]
-    sections += ["figures"] if drawings else []
+    sections += ["figures"] if any(d.name != "success" for d in drawings) else []
     sections += ["failures"] if failures else []
     sections += ["videos"] if any("video" in t for t in trials) else []
     return render(
         "report.html",
-        title=", ".join(names),
+        title="RoboSPA evaluation of " + ", ".join(names),
+        headline=headline(runs),
         badges=badges(runs, names),
         scores_shown=len(report.models),
         banner=report.banner,
@@ -100,18 +121,27 @@ def page(
         warnings=[line for line in report.findings if not line.startswith("error")],
         tables=for_page(report.tables),
         note=" ".join(report.method),
-        figures=[figure(d, drawn or folder, formats) for d in drawings],
+        panels=panels(report.shared),
+        colours=COLOURS,
+        figures=[figure(d, drawn or folder, formats) for d in drawings if d.name != "success"],
+        formats=formats,
         failures=failures,
+        trials=sizes,
+        most_failed=max(
+            (n / of for row in failures for n, of in zip(row.counts, sizes, strict=True)), default=1
+        ),
+        rate_words=RATE_WORDS,
         names=names,
         runs=[{"name": name, "facts": facts(run)} for name, run in report.named_runs],
         sections=sections,
-        left_out=listed - len(trials),
+        left_out=sum(sizes) - len(trials),
         live=live,
         data={
             "names": names,
             "kinds": NAMES,
             "speed": SIMULATED_PER_FILM,
-            "playable": True,  # the reader has the runs' folders
+            "folders": [shlex.quote(str(run.folder)) for run in runs],
+            "live": live,
             "trials": trials,
         },
     )
@@ -157,15 +187,18 @@ def card(name: str, scores: Scores, listed: int = 0, progress: str = "") -> Scor
     all models have, if that are more than the `scores` are of. `progress` says what is still to be
     run: the values are of what has finished."""
     overall = scores.overall.get(0)
-    value, _, interval = percent(overall.values.get("sr") if overall else None).partition(" ")
+    lack = "no result yet" if progress else "no value: results are missing"
+    rates = [
+        _rate(metric, overall.values.get(metric) if overall else None, lack)
+        for metric in FIRST_RATES
+    ]
     lines = []
     names = {d: scores.dimensions.get((d, 0)) for d in DIMENSIONS}
     names |= {CATEGORY_NAMES[c]: scores.categories.get((c, 0)) for c in BASIC}
-    for name_of, part in {"": overall, **names}.items():
-        if part is not None:
-            known = [m for m in ("sr", "sr1") if part.values.get(m) and (name_of or m != "sr")]
-            texts = [f"{METRIC_NAMES[m]} {percent(part.values[m])}" for m in known]
-            lines += [(f"{name_of}: " if name_of else "") + ", ".join(texts)] * bool(texts)
+    for name_of, part in names.items():
+        known = [m for m in FIRST_RATES if part is not None and part.values.get(m)]
+        texts = [f"{METRIC_NAMES[m]} {percent(part.values[m])}" for m in known if part is not None]
+        lines += [f"{name_of}: " + ", ".join(texts)] * bool(texts)
     if overall is not None:
         count = sum(cell.category not in BASIC for cell in scores.cells.values())
         covered = f"{count} variant{'' if count == 1 else 's'}"
@@ -173,21 +206,57 @@ def card(name: str, scores: Scores, listed: int = 0, progress: str = "") -> Scor
             covered = f"the {count} of {listed} variants that all have"
         lines.append(f"mean over {covered}, {overall.trials} trials" + " so far" * bool(progress))
     lines += [progress] if progress else []
-    lack = "no result yet" if progress else "no value: results are missing"
-    return ScoreCard(
-        name,
-        f"{value} %" if value != "–" else value,
-        f"95 % interval {interval}" if interval else lack,
-        tuple(lines),
-        _bar(overall.values.get("sr") if overall else None),
-    )
+    return ScoreCard(name, tuple(r for r in rates if r.bar or r.name == "SR"), tuple(lines))
 
 
-def _bar(estimate: Estimate | None) -> tuple[float, float, float] | None:
-    if estimate is None:
-        return None
-    value, low, high = (round(100 * x, 1) for x in (estimate.value, estimate.low, estimate.high))
-    return value, max(0.0, low), min(100.0, high)
+FIRST_RATES = ("sr", "sr1")
+RATE_WORDS = {
+    "SR": "success rate by the official rule",
+    "SR@1": "success rate with nothing else tried before",
+}
+
+
+def _rate(metric: str, found: Estimate | None, lack: str) -> ShownRate:
+    if found is None:
+        return ShownRate(METRIC_NAMES[metric], "–", lack, None)
+    text, _, interval = percent(found).partition(" ")
+    value, low, high = (round(100 * x, 1) for x in (found.value, found.low, found.high))
+    bar = (value, max(0.0, low), min(100.0, high))
+    return ShownRate(METRIC_NAMES[metric], f"{text} %", f"95 % interval {interval}", bar)
+
+
+def panels(models: Sequence[ModelResults]) -> list[Panel]:
+    """Success by level of `models`, a panel a category that any of them has."""
+    made = []
+    for category in (*CATEGORIES, *BASIC):
+        lines: list[tuple[int, str, str, str]] = []
+        guessed: dict[int, float] = {}
+        for number, scores in enumerate(model.scores for model in models):
+            guessed |= {n: v for (c, n), v in chance_levels(scores).items() if c == category}
+            found = {n: a.values for (c, n), a in scores.categories.items() if c == category and n}
+            sr, first = ({n: e for n, v in found.items() if (e := v.get(m))} for m in FIRST_RATES)
+            bars = [f"M{_x(n)} {_y(100 * e.low)}V{_y(100 * e.high)}" for n, e in sr.items()
+                    if spread(scores, category, n)]  # fmt: skip
+            if sr:
+                paths = (_path({n: 100 * e.value for n, e in one.items()}) for one in (sr, first))
+                lines.append((number, next(paths), "".join(bars), next(paths)))
+        if lines:
+            made.append(Panel(category, CATEGORY_NAMES[category], tuple(lines), _path(guessed)))
+    return made
+
+
+def _path(values: Mapping[int, float]) -> str:
+    """A line through percents by level."""
+    points = [f"{_x(n)} {_y(value)}" for n, value in sorted(values.items())]
+    return "M" + "L".join(points) if points else ""
+
+
+def _x(level: int) -> float:
+    return 10 + 25 * (level - 1)
+
+
+def _y(value: float) -> float:
+    return round(60 - value / 2, 1)
 
 
 def figure(drawing: DrawnFigure, folder: Path, formats: Sequence[str] = FORMATS) -> PageFigure:

@@ -125,8 +125,8 @@ def _tables(own: Sequence[ModelResults], columns: Sequence[Column]) -> list[Repo
 def _track_tables(own: Sequence[ModelResults], columns: Sequence[Column]) -> list[ReportTable]:
     axes = [table for metric in ("sr", "sr1") if (table := by_axis(own, metric))]
     beside = [table for made in BESIDE if (table := made(own))]
-    ours = [ReportTable(table, False) for table in (*axes, *beside)]
-    return [*ours, *report_tables(columns)]
+    ours = [ReportTable(table, table.name == "comparable") for table in beside]
+    return [*(ReportTable(table, False) for table in axes), *report_tables(columns), *ours]
 
 
 def banners(models: Sequence[ModelResults]) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
 from itertools import compress
 
 from msgspec import to_builtins
@@ -10,9 +11,10 @@ from msgspec import to_builtins
 from robospa.results.paper.origin import SPLITS
 from robospa.results.records.action_problems import problem_lines
 from robospa.results.records.manifest import RunAbout, departures
-from robospa.results.records.runs import Run, setting_parts
+from robospa.results.records.runs import TRIALS, Run, setting_parts
 from robospa.results.records.trial_record import PROCESSOR
 from robospa.results.scoring.repeats import error_rates_text, policy_errors, repeats_text
+from robospa.text import counted, some
 
 END_NAMES = {
     "success": "success",
@@ -48,6 +50,24 @@ def names_of(runs: Sequence[Run]) -> list[str]:
 def _differ(names: Sequence[str], extra: Sequence[str], name: str) -> bool:
     """Whether several of `names` are `name`, and what is `extra` tells some of them apart."""
     return len({text for other, text in zip(names, extra, strict=True) if other == name}) > 1
+
+
+def headline(runs: Sequence[Run]) -> str:
+    """When and on what `runs` were made, in a line."""
+    made = sorted({max([p.stat().st_mtime for p in (run.folder / TRIALS).glob("*.jsonl")] or [0])
+                   for run in runs} - {0})  # fmt: skip
+    days = [datetime.fromtimestamp(time, UTC).strftime("%-d %B %Y") for time in made]
+    cut = [run.manifest.settings for run in runs]
+    tasks = len({key.task for run in runs for key in run.keys})
+    parts = (
+        " to ".join(dict.fromkeys((*days[:1], *days[-1:]))),
+        "suite " + some(sorted({run.manifest.suite for run in runs})),
+        _words(dict.fromkeys(name for one in cut for name in one.embodiment)),
+        some(list(dict.fromkeys(mode for one in cut for mode in one.mode))) + " scenes",
+        some(list(dict.fromkeys(split for one in cut for split in one.split))) + " sentences",
+        f"{sum(len(run.keys) for run in runs):,} trials of {counted(tasks, 'task')}",
+    )
+    return " · ".join(part for part in parts if part)
 
 
 def about(run: Run) -> dict[str, object]:

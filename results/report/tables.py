@@ -16,7 +16,7 @@ from robospa.results.paper.result_tables import summary_table, task_table
 from robospa.results.paper.tables import basic_table, write_tables
 from robospa.results.scoring.models import ModelResults, by_track, restricted
 from robospa.results.scoring.scores import Variant
-from robospa.results.tables import Table, html_fragment
+from robospa.results.tables import Table, TableRow, html_fragment
 from robospa.trial import BASIC, METRIC_CATEGORIES, METRICS
 
 if TYPE_CHECKING:
@@ -57,8 +57,8 @@ def beside_runs(published: ModelResults, runs: Sequence[ModelResults]) -> ModelR
 
 FEW = 2
 """So many columns are shown with all their levels; more of them as in the paper."""
-MOST_OPEN_ROWS = 30
-"""Of a table of tasks beside others; a longer one is opened by hand."""
+MOST_OPEN_ROWS = 8
+"""Of a table of tasks; a longer one is opened by hand."""
 LONG = 250
 """Characters of a note; longer ones are opened by hand."""
 
@@ -79,12 +79,13 @@ def report_tables(columns: Sequence[Column]) -> list[ReportTable]:
     shown = {m: _beside(columns, runs, m) for m in METRICS if any(_has(c, m) for c in runs)}
     for metric, beside in shown.items():
         heads, name = _heads(beside, levels, metric), "main" if metric == "sr" else metric
-        made.append(ReportTable(summary_table(beside, name, metric, heads, covering=runs), False))
+        table = summary_table(beside, name, metric, heads, covering=runs)
+        made.append(ReportTable(table, metric not in ("sr", "sr1")))
     if any(c.covers_basic for c in runs):
         made.append(ReportTable(basic_table(columns, ("sr", "sr1")), False))
     for metric, beside in shown.items():
         table = task_table(beside, f"{metric}-tasks", metric, covering=runs)
-        made.append(ReportTable(table, len(columns) > 1 and len(table.rows) > MOST_OPEN_ROWS))
+        made.append(ReportTable(table, len(table.rows) > MOST_OPEN_ROWS))
     return [one for one in made if any(line.cells for line in one.table.rows)]
 
 
@@ -127,7 +128,7 @@ def for_page(tables: Sequence[ReportTable]) -> list[PageTable]:
     said: set[str] = set()
     for table in tables:
         new = tuple(note for note in table.table.notes if table.folded or note not in said)
-        paper_table = replace(table.table, notes=new)
+        paper_table = replace(table.table, notes=new, rows=tuple(map(_short, table.table.rows)))
         if not table.folded:
             said.update(new)
         long = [note for note in paper_table.notes if len(note) > LONG]
@@ -137,6 +138,12 @@ def for_page(tables: Sequence[ReportTable]) -> list[PageTable]:
         html = Markup(html_fragment(short))
         made.append(PageTable(paper_table.title, html, table.folded, long))
     return made
+
+
+def _short(row: TableRow) -> TableRow:
+    """`row` with its intervals beside the values' text, which the page shows if asked."""
+    cells = (c if c.low is None else replace(c, text=c.text.split(" [")[0]) for c in row.cells)
+    return replace(row, cells=tuple(cells))
 
 
 def write_files(tables: Sequence[ReportTable], folder: Path) -> None:

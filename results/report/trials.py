@@ -86,13 +86,30 @@ def _row(
     return {name: value for name, value in row.items() if value not in ("", None, [])}
 
 
+EVENT_WORDS = {
+    "closed": "gripper closed",
+    "approached": "gripper came near",
+    "grasped": "lifted",
+    "subtask_done": "step {} done:",
+    "subtask_undone": "step {} undone:",
+    "wrong_object": "wrong object:",
+    "wrong_order": "out of turn:",
+    "repeated": "step {} done again:",
+    "success": "task solved",
+    "failed": "goal lost:",
+    "clutter_moved": "moved clutter:",
+}
+CLOSED = {"touching": " on", "beside": " beside"}
+
+
 def event_row(event: EventRow, record: TrialRecord) -> list[float | str]:
-    """Simulated time [s], kind, and the rest in words, of an event of `record`."""
-    kind = str(event.get("kind", "")).replace("_", " ")
-    words = [text for text in (event.get("object"), event.get("note")) if text]
-    if int(event.get("index", -1)) >= 0:
-        words.insert(0, f"#{int(event['index']) + 1}")
-    return [round(float(event.get("time", 0.0)), 2), kind, described(" ".join(words), record)]
+    """Simulated time [s], what happened, and to what, in words, of an event of `record`."""
+    kind, note = str(event.get("kind", "")), str(event.get("note", ""))
+    words = EVENT_WORDS.get(kind, kind.replace("_", " ")).format(int(event.get("index", -1)) + 1)
+    if kind == "closed" and note in CLOSED:
+        words, note = words + CLOSED[note], ""
+    rest = described(f"{event.get('object') or ''} {note}".strip(), record)
+    return [round(float(event.get("time", 0.0)), 2), words if rest else words.rstrip(":"), rest]
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import http.client
+import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -38,12 +40,14 @@ def server(run: Path) -> Iterator[ReportServer]:
         yield found
 
 
-def ask(server: ReportServer, path: str, **headers: str) -> tuple[int, dict[str, str], bytes]:
+def ask(
+    server: ReportServer, path: str, method: str = "GET", **headers: str
+) -> tuple[int, dict[str, str], bytes]:
     """Status, headers and body of an answer."""
     connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=30)
     try:
         connection.request(
-            "GET", path, headers={k.replace("_", "-"): v for k, v in headers.items()}
+            method, path, headers={k.replace("_", "-"): v for k, v in headers.items()}
         )
         answer = connection.getresponse()
         return answer.status, dict(answer.headers), answer.read()
@@ -75,6 +79,28 @@ def test_a_film_that_follows_its_record_changes_the_page(run: Path, server: Repo
     status, _, body = ask(server, "/", If_None_Match=headers["ETag"])
     assert status == 200 and record.video in body.decode()
     assert '"film":' not in body.decode()
+
+
+def test_a_trial_in_3d_is_for_the_pages_own_button(
+    server: ReportServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started = []
+    real = subprocess.Popen
+
+    def popen(command: list[str], **more: object) -> object:
+        started.append(command)
+        said = "nothing is there" if "x" in command else "It is at http://127.0.0.1:5 (Ctrl-C)"
+        return real([sys.executable, "-c", f"print({said!r})"], **more)  # type: ignore[call-overload]
+
+    monkeypatch.setattr(subprocess, "Popen", popen)
+    own = {"Origin": server.address.rstrip("/")}
+    status, headers, _ = ask(server, "/3-D/Pick-L1-3", "POST", **own)
+    assert (status, headers["Location"]) == (303, "http://127.0.0.1:5")
+    assert started[0][-3:] == ["--", str(server.report.folder), "Pick-L1-3"]
+    assert ask(server, "/3-D/x", "POST", **own)[::2] == (500, b"nothing is there")
+    assert ask(server, "/else/x", "POST", **own)[0] == 404
+    assert ask(server, "/3-D/x", "POST", Origin="http://evil.org")[0] == 403
+    assert ask(server, "/3-D/x", "POST")[0] == 403 and len(started) == 2
 
 
 def test_a_page_that_took_long_is_given_again_for_a_while(

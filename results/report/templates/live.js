@@ -1,7 +1,7 @@
 // A run that is still going: the page is asked for again, and what changed in it is put in place.
 const liveLine = document.getElementById("live");
 let tag = "";
-const PARTS = ["summary", "tables", "figures", "failures", "videos", "runs"]; // trials come as data
+const PARTS = ["summary", "videos", "tables", "figures", "runs"]; // trials come as data
 
 function keepState(fresh, old) {
   const mark = old.querySelector("#intervals");
@@ -15,7 +15,7 @@ function put(page) {
     const old = document.getElementById(name);
     if (!fresh || (old && name === "videos")) continue; // films stay: one of them may be playing
     const next = document.importNode(fresh, true);
-    if (!old) ((name !== "videos" && document.getElementById("videos")) || document.getElementById("trials")).before(next);
+    if (!old) document.getElementById(name === "videos" ? "tables" : "trials").before(next);
     else if (old.outerHTML !== next.outerHTML) {
       keepState(next, old);
       old.replaceWith(next);

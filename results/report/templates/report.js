@@ -1,6 +1,5 @@
 // A run's trials: list, filters, videos beside events.
-const PAGE = 100;
-const FIRST_FRAME = "#t=0.05"; // shown before it is played; without it a video is black
+const PAGE = 25;
 const FILM_TEXTS = { follows: "The video of this trial follows.",
   owed: "The video of this trial is still to be made: robospa report RUN --film makes it." };
 
@@ -42,6 +41,20 @@ function eventList(trial, video) {
   return list;
 }
 
+// In 3-D: a button where a server can play it, else the command, which a click selects and copies.
+function in3D(folder, name) {
+  if (data.live) {
+    return make("form", { method: "post", action: "/3-D/" + name, target: "_blank" }, make("button", {}, "show in 3-D"));
+  }
+  const command = make("code", {}, `robospa view ${folder} ${name}`);
+  const copy = make("button", { type: "button", className: "jump" }, "copy");
+  copy.addEventListener("click", () => {
+    getSelection().selectAllChildren(command);
+    navigator.clipboard?.writeText(command.textContent).catch(() => {});
+  });
+  return make("p", { className: "note" }, "in 3-D: ", command, " ", copy);
+}
+
 const sameScene = (a, b) => a.task === b.task && a.level === b.level && a.seed === b.seed;
 function pane(trial) {
   let film = null;
@@ -49,7 +62,9 @@ function pane(trial) {
   if (trial.video) {
     film = document.getElementById("film").content.firstElementChild.cloneNode(true);
     video = film.querySelector("video");
-    video.src = encodeURI(trial.video).replaceAll("#", "%23").replaceAll("?", "%3F") + FIRST_FRAME;
+    const shown = Math.max(0.05, (trial.at ?? 0) / data.speed); // a failure's moment; without any a video is black
+    video.src = encodeURI(trial.video).replaceAll("#", "%23").replaceAll("?", "%3F") + "#t=" + shown.toFixed(2);
+    for (const kind of ["pointerenter", "focus", "play"]) video.addEventListener(kind, () => { video.controls = true; });
     film.querySelector("select").addEventListener("change", (event) => { video.playbackRate = event.target.value; });
     video.addEventListener("loadedmetadata", () => { // several cameras stand side by side in it
       video.style.aspectRatio = video.videoWidth + " / " + video.videoHeight;
@@ -80,10 +95,7 @@ function pane(trial) {
   if (trial.attempts) small.push(trial.attempts + " attempts");
   if (trial.digest) small.push("final state " + trial.digest);
   text.append(make("p", { className: "note" }, small.join(", ")));
-  if (data.playable && trial.steps) {
-    const command = `robospa view RUN ${trial.task}-L${trial.level}-${trial.seed}`;
-    text.append(make("p", { className: "note" }, "in 3-D: ", make("code", {}, command)));
-  }
+  if (data.folders && trial.steps) text.append(in3D(data.folders[trial.run], `${trial.task}-L${trial.level}-${trial.seed}`));
   return make("div", { className: video ? "trial filmed" : "trial" }, film || "", text);
 }
 
@@ -292,10 +304,11 @@ document.addEventListener("click", (event) => {
 });
 function showFilms() {
   const films = document.querySelector(".films:empty");
-  for (const trial of data.trials.filter((t) => t.video).slice(0, films ? 6 : 0)) {
-    const title = `${words(trial.task)}, level ${trial.level}, seed ${trial.seed}`;
-    films.append(make("div", {}, make("h3", {}, title + ": ",
-      make("span", { className: "end" + (trial.good ? " good" : "") }, trial.end)), pane(trial)));
+  const filmed = data.trials.filter((t) => t.video); // failures first, a type for each
+  const rank = (t) => (t.good ? 2 : filmed.find((o) => o.failure === t.failure) !== t);
+  for (const trial of [...filmed].sort((a, b) => rank(a) - rank(b)).slice(0, films ? 3 : 0)) {
+    const end = make("span", { className: "end" + (trial.good ? " good" : "") }, failureName(trial) || trial.end);
+    films.append(make("div", {}, make("h3", {}, `${words(trial.task)} L${trial.level}: `, end), pane(trial)));
   }
 }
 fillFilters();

@@ -16,7 +16,7 @@ from robospa.results.paper.published import load
 from robospa.results.records.runs import film_name, read_run
 from robospa.results.records.trial_record import EventRow
 from robospa.results.report import score_table as tables
-from robospa.results.report.page import write_report
+from robospa.results.report.page import panels, write_report
 from robospa.results.report.report import make_report
 from robospa.results.report.trials import event_row
 from robospa.results.scoring.models import IncomparableError, results_of_run
@@ -88,7 +88,9 @@ def test_several_runs_and_published_models_stand_side_by_side(tmp_path: Path) ->
 
 def cards_of(page: str) -> dict[str, str]:
     """The text of every card of the summary, by its name."""
-    found = re.findall(r'<div class="card"><h3>(.*?)</h3>(.*?)\n</div>', page, re.DOTALL)
+    found = re.findall(
+        r'<div class="card"[^>]*><h3>(.*?)</h3>(.*?)\n</div>\n</div>', page, re.DOTALL
+    )
     return {name: " ".join(re.sub("<[^>]*>", " ", text).split()) for name, text in found}
 
 
@@ -101,7 +103,7 @@ def test_published_models_stand_beside_a_run_over_the_same_variants(tmp_path: Pa
     two = data.value("RDT", "sr", "Press_Stapler_Repeat", 2)
     assert one is not None and two is not None
     card = cards_of(page)["RDT (paper)"]
-    assert card.startswith(f"{(one + two) / 2:.1f} %")
+    assert card.startswith(f"SR {(one + two) / 2:.1f} %")
     assert "mean over 2 variants, 200 trials" in card
     overall = [model.scores.overall[0].trials for model in report.shared]
     assert overall == [6, 200]
@@ -127,6 +129,17 @@ def test_a_banner_says_what_differs_before_any_number_of_the_paper(tmp_path: Pat
         "Tasks, rules, thresholds, layouts, step limits and the robot are"
         in (alone / "report.md").read_text()
     )
+
+
+def test_of_one_trial_a_cell_no_whiskers_are_drawn(tmp_path: Path) -> None:
+    found = {}
+    for trials in (1, 3):
+        records = [shown("Pick_Blocks_Size", n, s, s > 0) for n in (1, 2) for s in range(trials)]
+        run = make_run(tmp_path / str(trials), records)
+        (found[trials],) = panels(make_report(run).models)
+    ((_, line, none, first),) = found[1].lines
+    assert (line, first, none) == ("M10 60.0L35 60.0", "M10 60.0L35 60.0", "")
+    assert found[3].lines[0][2].count("V") == 2 and found[1].category == "GAC"
 
 
 def test_runs_of_different_variants_have_cards_of_what_both_ran(tmp_path: Path) -> None:
@@ -249,9 +262,13 @@ def test_percent_has_no_negative_zero() -> None:
 def test_an_event_in_words() -> None:
     event = EventRow(time=1.5, kind="wrong_object", object="object_3", index=1, note="lifted")
     old = shown("Pick_Blocks_Size", 1, 0, False)
-    assert event_row(event, old) == [1.5, "wrong object", "#2 object_3 lifted"]
+    assert event_row(event, old) == [1.5, "wrong object:", "object_3 lifted"]
     new = replace(old, diagnostics={"objects": {"object_3": "the red cup", "object_30": "no"}})
-    assert event_row(event, new) == [1.5, "wrong object", "#2 the red cup lifted"]
+    assert event_row(event, new) == [1.5, "wrong object:", "the red cup lifted"]
+    closed = EventRow(time=2.0, kind="closed", object="object_3", index=1, note="touching")
+    assert event_row(closed, new) == [2.0, "gripper closed on", "the red cup"]
+    step = EventRow(time=3.0, kind="subtask_done", object="", index=1, note="")
+    assert event_row(step, new) == [3.0, "step 2 done", ""]
 
 
 def test_runs_at_both_ends_are_marked_under_the_bootstrap_too(tmp_path: Path) -> None:

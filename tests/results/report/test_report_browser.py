@@ -94,24 +94,24 @@ def test_text_from_outside_stays_text(page: Page) -> None:
 
 
 def test_pages_of_the_list(page: Page) -> None:
-    assert page.run(SHOWN) == f"1–100 of {COUNT} trials"
+    assert page.run(SHOWN) == f"1–25 of {COUNT} trials"
     assert page.run("document.getElementById('back').disabled")
     page.click("#next")
-    assert page.run(SHOWN) == f"101–{COUNT} of {COUNT} trials"
-    assert len(page.run(ROWS)) == COUNT - 100
+    assert page.run(SHOWN) == f"26–50 of {COUNT} trials"
+    assert len(page.run(ROWS)) == 25
     page.click("#back")
-    assert page.run(SHOWN) == f"1–100 of {COUNT} trials"
+    assert page.run(SHOWN) == f"1–25 of {COUNT} trials"
 
 
 def test_filters_work_together_and_are_cleared(page: Page) -> None:
     choose(page, "end", "step limit")
-    assert page.run(SHOWN) == "1–30 of 30 trials"
+    assert page.run(SHOWN) == "1–25 of 30 trials"
     choose(page, "failure", "target_grounding")
     assert page.run(SHOWN) == "1–1 of 1 trials"
     choose(page, "task", "Press_Stapler_Repeat")
     assert page.run(SHOWN) == "no trial matches"
     page.click("button[type=reset]")
-    page.wait(f"{SHOWN} === '1–100 of {COUNT} trials'")
+    page.wait(f"{SHOWN} === '1–25 of {COUNT} trials'")
 
 
 def test_text_search_needs_every_word(page: Page) -> None:
@@ -125,6 +125,14 @@ def test_a_failure_types_button_lists_its_trials(page: Page) -> None:
     page.click(".of-kind[data-kind=target_grounding]")
     page.wait(f"{SHOWN} === '1–1 of 1 trials'")
     assert page.run(ROWS)[0][4] == "target grounding"
+
+
+def test_what_a_run_is_and_how_good_stands_on_the_first_screen(page: Page) -> None:
+    page.look(1280, 860)
+    for part in ("header .lead", ".card .big", ".of-kind", ".panels figure", "#videos h2"):
+        found = f"[...document.querySelectorAll('{part}')]"
+        bottoms = page.run(f"{found}.map(e => e.getBoundingClientRect().bottom)")
+        assert 0 < max(bottoms) <= 860, part
 
 
 def test_columns_sort_both_ways(page: Page) -> None:
@@ -218,7 +226,8 @@ def test_an_address_leads_to_a_trial_of_a_later_page(page: Page) -> None:
 
 def test_a_film_shows_its_first_frame_and_plays_at_the_chosen_speed(page: Page) -> None:
     film = "document.querySelector('.films video')"
-    assert page.run(f"{film}.src").endswith("#t=0.05")
+    at = page.run("data.trials[1].at")
+    assert page.run(f"{film}.src").endswith(f"#t={at / 2:.2f}"), "the failure's moment"
     page.run(
         "(() => { const s = document.querySelector('.films .speed select'); s.value = '4';"
         "s.dispatchEvent(new Event('change')); })()"
@@ -253,5 +262,6 @@ def test_a_trial_that_the_other_run_filmed_not_has_no_button(browser: Page, two_
     assert browser.run("document.querySelectorAll('.side > div').length") == 2
     assert browser.run("document.querySelector('.together')") is None
     code = "document.querySelector('.side code').innerText"
-    assert browser.run(code) == "robospa view RUN Pick_Blocks_Size-L1-2"
+    folder = two_runs.parent.parent / "one"
+    assert browser.run(code) == f"robospa view {folder} Pick_Blocks_Size-L1-2"
     assert browser.problems == []

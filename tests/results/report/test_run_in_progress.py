@@ -78,7 +78,7 @@ def test_lost_trials_of_a_run_in_progress_are_missing(folder: Path) -> None:
 
 def test_the_live_page_shows_the_rate_so_far_with_its_interval(folder: Path) -> None:
     page = page_of(folder)
-    card = " ".join(re.sub("<[^>]*>", " ", page.split('<div class="big">')[1]).split())
+    card = " ".join(re.sub("<[^>]*>", " ", page.split('<div class="big">', 1)[1]).split())
     found = wilson(3, 4)
     interval = f"95 % interval [{100 * found.low:.1f}, {100 * found.high:.1f}]"
     assert f"75.0 % {interval}" in card
