@@ -229,8 +229,8 @@ def test_what_stands_on_the_floor_is_lowered_too(package: Path) -> None:
     assert scene.object(scene.facts["dustbin"]).pose.position[2] == scene.table_rise
 
 
-def test_every_task_has_a_goal_and_a_plan_there(package: Path) -> None:
-    for name, task in tasks().items():
+def test_tasks_of_every_family_have_a_goal_and_a_plan_there(package: Path) -> None:
+    for name, task in {pair[1].draw.__module__: pair for pair in tasks().items()}.values():
         clean, scene = (build_scene(name, 3, 1, mode=m) for m in ("clean", MODE))
         assert task.goal(scene).total == task.goal(clean).total, name
         assert len(task.plan(scene)) == len(task.plan(clean)), name

@@ -49,85 +49,43 @@ def test_where_mesa_comes_from(tmp_path: Path, os_release: str, source: str) -> 
     assert setup(tmp_path, "vulkan_source", os_release).strip() == source
 
 
-def test_a_usable_device_is_left_alone(tmp_path: Path) -> None:
+NO_ROOT = "root_prefix() { return 1; }; dry_run=0; ensure_vulkan"
+FAILING = "env() { echo 'E: Unable to locate package x'; return 100; }; dry_run=0; apt_install x"
+NEEDED = "because SAPIEN finds no Vulkan device"
+
+
+@pytest.mark.parametrize(
+    ("os_release", "body", "words"),
+    [
+        (DEBIAN_12, "ensure_vulkan", ["adding the package source bookworm-backports", NEEDED]),
+        (DEBIAN_12, "ensure_vulkan", ["recommends -t bookworm-backports mesa-vulkan-drivers"]),
+        (DEBIAN_13, "ensure_vulkan", ["--no-install-recommends mesa-vulkan-drivers", NEEDED]),
+        (UBUNTU_2404, "ensure_vulkan", ["--no-install-recommends mesa-vulkan-drivers"]),
+        (DEBIAN_13, NO_ROOT, ["please run: sudo apt-get update && ", "only physics will run"]),
+        (DEBIAN_12, NO_ROOT, ["bookworm-backports main' | sudo tee", "-y -t bookworm-backports "]),
+        (DEBIAN_12, FAILING, ["apt-get could not install x: E: Unable to locate package x\n"]),
+        (
+            ARCH,
+            "can_make_venv() { return 1; }; ensure_venv",
+            ["-venv with apt, because", "--clear"],
+        ),
+        (ARCH, "python_ok() { return 1; }; ensure_venv", ["set PYTHON to a newer one"]),
+        (ARCH, "main --fast", ["unknown option --fast"]),
+    ],
+)
+def test_what_is_done_or_said(tmp_path: Path, os_release: str, body: str, words: list[str]) -> None:
+    said = setup(tmp_path, body, os_release)
+    assert [word for word in words if word not in said] == []
+
+
+def test_what_is_there_is_not_brought_again(tmp_path: Path) -> None:
     assert setup(tmp_path, "vulkan_usable() { return 0; }; ensure_vulkan") == ""
-
-
-def test_debian_12_takes_the_driver_from_backports(tmp_path: Path) -> None:
-    said = setup(tmp_path, "ensure_vulkan")
-    assert "adding the package source bookworm-backports" in said
-    assert "install -y --no-install-recommends -t bookworm-backports mesa-vulkan-drivers" in said
-
-
-def test_a_known_backports_source_is_not_added_again(tmp_path: Path) -> None:
     sources = tmp_path / "sources.list.d"
     sources.mkdir()
     (sources / "mine.sources").write_text("Suites: bookworm-backports\n")
     assert "adding the package source" not in setup(tmp_path, "ensure_vulkan")
-
-
-@pytest.mark.parametrize("os_release", [DEBIAN_13, UBUNTU_2404])
-def test_newer_systems_take_the_driver_from_their_archive(tmp_path: Path, os_release: str) -> None:
-    said = setup(tmp_path, "ensure_vulkan", os_release)
-    assert "install -y --no-install-recommends mesa-vulkan-drivers" in said
-    assert "backports" not in said
-
-
-def test_the_driver_is_announced_with_its_reason(tmp_path: Path) -> None:
-    first = setup(tmp_path, "ensure_vulkan", DEBIAN_13).splitlines()[0]
-    assert "software Vulkan driver" in first and "because SAPIEN finds no Vulkan device" in first
-
-
-def test_without_root_the_command_to_run_is_printed(tmp_path: Path) -> None:
-    said = setup(tmp_path, "root_prefix() { return 1; }; dry_run=0; ensure_vulkan", DEBIAN_13)
-    assert "please run: sudo apt-get update && sudo apt-get install -y mesa-vulkan-drivers" in said
-    assert "only physics will run" in said
-
-
-def test_without_root_debian_12_is_told_how_to_add_backports(tmp_path: Path) -> None:
-    said = setup(tmp_path, "root_prefix() { return 1; }; dry_run=0; ensure_vulkan")
-    assert "bookworm-backports main' | sudo tee" in said
-    assert "apt-get install -y -t bookworm-backports mesa-vulkan-drivers" in said
-
-
-def test_a_failing_apt_gives_one_sentence(tmp_path: Path) -> None:
-    fake = "env() { echo 'E: Unable to locate package nonsense'; return 100; }"
-    said = setup(tmp_path, f"{fake}; dry_run=0; apt_install nonsense || echo refused")
-    assert said.splitlines() == [
-        "setup: apt-get could not install nonsense: E: Unable to locate package nonsense",
-        "refused",
-    ]
-
-
-def test_a_missing_venv_module_is_installed_for_that_python(tmp_path: Path) -> None:
-    said = setup(tmp_path, "can_make_venv() { return 1; }; ensure_venv")
-    assert "-venv with apt, because" in said
-    assert "-m venv --clear" in said
-
-
-def test_an_old_python_is_refused(tmp_path: Path) -> None:
-    said = setup(tmp_path, "python_ok() { return 1; }; ensure_venv")
-    assert "installing python3 and python3-venv with apt" in said
-    assert "set PYTHON to a newer one" in said
-
-
-def test_locked_packages_are_installed_once(tmp_path: Path) -> None:
     (tmp_path / "venv").mkdir()
     body = f"cd {SCRIPT.parents[1]}; pip_install() {{ echo pip; }}; ensure_packages; dry_run=0; "
-    said = setup(tmp_path, body + "ensure_packages; ensure_packages")
-    assert said.count("pip\n") == 2  # the dry run leaves no stamp, the first real one does
-
-
-def test_the_development_lock_covers_the_other_one(tmp_path: Path) -> None:
-    (tmp_path / "venv").mkdir()
-    body = f"cd {SCRIPT.parents[1]}; dry_run=0; pip_install() {{ echo pip; }}; "
-    said = setup(
-        tmp_path,
-        body
-        + "lock=requirements-dev.lock; ensure_packages; lock=requirements.lock; ensure_packages",
-    )
-    assert said.count("installing the packages") == 1
-
-
-def test_unknown_options_are_refused(tmp_path: Path) -> None:
-    assert "unknown option --fast" in setup(tmp_path, "main --fast")
+    body += "lock=requirements-dev.lock; ensure_packages; lock=requirements.lock; ensure_packages"
+    # The dry run leaves no stamp, the first real one does: the development lock has the other's.
+    assert setup(tmp_path, body).count("installing the packages") == 2

@@ -61,37 +61,30 @@ def test_shares_are_those_of_the_recorded_purposes() -> None:
     )
 
 
-def test_old_records_without_purposes_are_all_other() -> None:
-    shares = TimeBreakdown()
-    shares.add(record())
-    assert shares.overall_shares()["other"] == 1.0
+FULL, IDLE = {"queue": 200.0, "infer": 100.0}, {"queue": 1.0, "infer": 100.0}
 
 
-def test_cores_that_are_busy_are_the_bottleneck() -> None:
-    assert (
-        "simulators are the bottleneck: they fill all 2 cores" in status(0.3, server()).bottleneck
-    )
+@pytest.mark.parametrize(
+    ("waiting", "servers", "cores", "words"),
+    [
+        (0.3, [{}], 2, "simulators are the bottleneck: they fill all 2 cores"),
+        (0.9, [FULL], 2, "the policy server is the bottleneck|wait 90 % of their time"),
+        (0.9, [IDLE], 2, "room for more workers"),
+        (0.9, [IDLE, FULL], 2, "room for more workers"),
+        (0.9, [IDLE, {}], 2, "workers wait 90 % of their time"),  # who says nothing may be full
+    ],
+)
+def test_what_holds_the_others_up(
+    waiting: float, servers: list[dict[str, float]], cores: int, words: str
+) -> None:
+    found = status(waiting, *(server(**means) for means in servers), cores=cores).bottleneck
+    assert all(word in found for word in words.split("|"))
 
 
-def test_a_server_whose_queue_is_longer_than_its_model_is_the_bottleneck() -> None:
-    full = server(queue=200.0, infer=100.0)
-    assert status(0.9, full).bottleneck.startswith("the policy server is the bottleneck")
-    assert "wait 90 % of their time" in status(0.9, full).bottleneck
-    assert "bottleneck" not in status(0.09, full, cores=8).bottleneck
+def test_nothing_is_blamed_where_nothing_is_known() -> None:
+    assert "bottleneck" not in status(0.09, server(**FULL), cores=8).bottleneck
     assert "bottleneck" not in status(0.9, server(), cores=0).bottleneck
-
-
-def test_idle_cores_and_idle_servers_have_room_for_more_workers() -> None:
-    assert "room for more workers" in status(0.9, server(queue=1.0, infer=100.0)).bottleneck
-    mixed = status(0.9, server(queue=1.0, infer=100.0), server(queue=900.0, infer=100.0))
-    assert "room for more workers" in mixed.bottleneck
-
-
-def test_of_a_server_that_reports_no_queue_nobody_knows_whether_it_has_room() -> None:
-    """It may be a serial one that compiles."""
-    assert status(0.9, server()).bottleneck == "workers wait 90 % of their time"
-    mixed = status(0.9, server(queue=1.0, infer=100.0), server())
-    assert mixed.bottleneck == "workers wait 90 % of their time"
+    assert Status(0.0, 2, 2, 2).bottleneck == ""
 
 
 def test_a_server_with_full_batches_is_full_before_its_queue_is_long() -> None:
@@ -109,10 +102,6 @@ def test_a_server_that_tells_nothing_is_full_when_it_answers_slower_than_it_coul
     assert slow.saturated
     slow.fastest = 390.0
     assert not slow.saturated
-
-
-def test_before_the_first_trial_there_is_nothing_to_say() -> None:
-    assert Status(0.0, 2, 2, 2).bottleneck == ""
 
 
 def test_servers_that_are_away_are_said_first() -> None:
