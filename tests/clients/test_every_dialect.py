@@ -52,13 +52,6 @@ def ask(name: str, model: Callable[[Any], Any], **options: object) -> Any:
 
 
 @every_dialect
-def test_the_same_chunk_through_every_dialect(name: str) -> None:
-    chunk = ask(name, lambda seen: joint_chunk())
-    assert chunk.dtype == np.float32
-    assert np.array_equal(chunk, joint_chunk().astype(np.float32))
-
-
-@every_dialect
 @pytest.mark.parametrize("shape", [(2, 13), (2, 15), (0, 14), (10_001, 14), (1, 2, 14)])
 def test_a_chunk_of_another_shape_is_the_policys_error(name: str, shape: Any) -> None:
     with pytest.raises(PolicyAnswerError, match="the policy answered"):

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import logging
-import re
 import socket
 import threading
 from collections.abc import Iterable, Iterator
@@ -17,13 +15,11 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from run_fakes import FakePolicy
 from standins import QUICK, Go1, Status, answered, joint_chunk, observation
 
 from robospa.action_space import ActionSpace
 from robospa.clients import check_options, connect, find_endpoint
 from robospa.clients.chunks import (
-    RobotOption,
     as_chunk,
     budget_warning,
     invert_grippers,
@@ -38,7 +34,7 @@ from robospa.protocol.errors import CallTimeout, HandshakeError, TransportError
 from robospa.protocol.options import option_table, plain_options, read_options, url_options
 from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.server import ServerThread
-from robospa.protocol.transport import Address, Timeouts, Transport
+from robospa.protocol.transport import Timeouts
 
 
 @contextmanager
@@ -83,14 +79,6 @@ def test_a_redirect_is_not_followed_and_named() -> None:
         pytest.raises(HandshakeError, match=r"redirects to https://evil\.org/act, which is not"),
     ):
         server.request("POST", "/act", b"{}", 10.0)
-
-
-def test_what_the_library_thinks_of_odd_servers_is_not_printed() -> None:
-    """Its thread meets an endless answer as an internal error, now and then."""
-    with ServerThread(FakePolicy()) as server:
-        transport = Transport(Address(server.url), Timeouts(connect=10))
-        assert not transport._socket.logger.isEnabledFor(logging.ERROR)
-        transport.close()
 
 
 class Gateway(Go1):
@@ -213,19 +201,6 @@ def test_a_page_lists_every_option(dialect: Dialect) -> None:
     )
 
 
-def test_the_page_lists_every_dialect() -> None:
-    page = (ROOT / "docs/clients.md").read_text()
-    rows = re.findall(r"^\| (`[^|]*://`) \| [^|]* \| (\w+), \w+ \| ([\d, ]+) \|$", page, re.M)
-    assert sorted(rows) == sorted(
-        (
-            ", ".join(f"`{scheme}://`" for scheme in dialect.schemes),
-            {"websocket": "WebSocket", "http": "HTTP", "tcp": "TCP"}[dialect.wire],
-            ", ".join([str(dialect.port), *(["443"] if dialect.secure_scheme else [])]),
-        )
-        for dialect in DIALECTS
-    )
-
-
 class Zeros:
     spec = PolicySpec("zeros", cameras=(), state="none")
 
@@ -310,12 +285,6 @@ def test_every_dialect_says_which_robot_its_servers_drive() -> None:
     for dialect in dialects():
         default = {f.name: f.default for f in fields(dialect.options)}.get("embodiment")
         assert default == "aloha-agilex", dialect.scheme
-
-
-def test_columns_are_declared_for_the_robot_that_is_known() -> None:
-    assert RobotOption().columns("joint") == 14
-    other = RobotOption("franka-panda")
-    assert (other.columns("joint"), other.columns("ee")) == (None, 16)
 
 
 def test_arms_of_six_and_seven_joints_are_sent_one_by_one() -> None:

@@ -98,14 +98,6 @@ def test_a_batch_is_what_the_data_loader_gives(torch: Any) -> None:
         np.testing.assert_allclose(batch[key][0, :, 0, 0], np.array(color) / 255, atol=1e-6)
 
 
-def test_sizes_may_be_left_to_the_policy_and_colours_turned(torch: Any) -> None:
-    policy = served(torch, resize="no", colors="bgr")
-    first(policy)
-    image = policy.before.seen[0]["observation.images.left_camera"]
-    assert image.shape == (1, 3, 240, 320)
-    np.testing.assert_allclose(image[0, ::-1, 0, 0] * 255, COLORS["left_wrist"], atol=1e-3)
-
-
 def test_images_renamed_in_training_are_sent_under_the_data_sets_names(torch: Any) -> None:
     keys = [f"observation.images.camera{i}" for i in (1, 2, 3)]
     ours = [f"observation.images.{name}" for name in ("head", "left_wrist", "right_wrist")]
@@ -155,13 +147,6 @@ def test_the_tokens_that_it_reads_are_declared(
 ) -> None:
     policy = served(torch, config(type=kind, tokenizer_max_length=tokens))
     assert policy.spec.text_budget == budget
-
-
-def test_nothing_outlives_a_query(torch: Any) -> None:
-    policy = served(torch)
-    first(policy)
-    policy.infer(seen(policy.spec, step=50))
-    assert policy.policy.resets == 2
 
 
 def test_a_batch_gives_what_singles_give(torch: Any) -> None:
@@ -223,12 +208,6 @@ def test_poses_in_and_out(torch: Any) -> None:
     assert policy.spec.action == "ee" and policy.spec.action_dim == 16
     np.testing.assert_allclose(chunk[0, 1, :7], observation["ee"][1, :7], atol=1e-6)
     assert chunk[0, :, 7].tolist() == [1.0, 0.0]
-
-
-def test_joint_actions_of_a_policy_that_sees_poses(torch: Any) -> None:
-    policy = served(torch, config(state=16, action=14))
-    first(policy)
-    assert policy.before.seen[0]["observation.state"].shape == (1, 16)
 
 
 @pytest.mark.parametrize(

@@ -344,13 +344,6 @@ def test_the_names_read_at_training_are_those_sent_at_evaluation(configs: dict[s
     assert {CAMERA_NAMES[ours]: ours for ours in openpi.CAMERAS.values()} == openpi.CAMERAS
 
 
-def test_low_memory_freezes_what_openpi_freezes(configs: dict[str, Any]) -> None:
-    made = openpi.train_config("pi05_lora_robospa_x")
-    variants = ["action_expert_variant", "paligemma_variant", "pi05"]
-    assert sorted(made.model.fields) == variants == made.freeze_filter
-    assert made.ema_decay is None and made.data.repo_id == "robospa/x"
-
-
 @pytest.mark.parametrize("name", ["pi05_robospa_", "pi05_aloha", "pi05_robospa_a/b", "x"])
 def test_another_name_is_refused(name: str, configs: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match="no configuration of ours"):
@@ -371,18 +364,3 @@ def test_a_script_of_openpi_finds_the_configurations_that_it_is_given(
     out = tmp_path / "out"
     openpi.main([str(script), "pi05_robospa_a", "--policy.config=pi05_lora_robospa_b", str(out)])
     assert out.read_text() == "__main__ pi05_lora_robospa_b pi05_robospa_a"
-
-
-def test_our_server_finds_the_configuration_of_a_dataset(
-    configs: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    given: list[Any] = []
-    install(
-        monkeypatch,
-        "openpi.policies.policy_config",
-        create_trained_policy=lambda config, folder: given.append(config) or SimpleNamespace(),
-    )
-    options = openpi.OpenPiServerOptions(config="pi05_robospa_x", checkpoint="19999")
-    policy = openpi.create(options)
-    assert given == [configs["pi05_robospa_x"]]
-    assert (policy.spec.name, policy.spec.horizon) == ("openpi:pi05_robospa_x", 50)

@@ -84,16 +84,6 @@ def test_xvla_poses_come_back_as_ours() -> None:
         assert chunk[0, 15] == 0  # 1.0 says closed
 
 
-def test_xvla_grippers_close_above_the_threshold() -> None:
-    def model(seen: Any) -> Any:
-        chunk = ee6d(3)
-        chunk[:, 9] = [0.69, 0.71, 0.3]
-        return chunk
-
-    assert answered(XVla(model))[:, 7].tolist() == [1, 0, 1]
-    assert answered(XVla(model), "?closed_above=0.2")[:, 7].tolist() == [0, 0, 0]
-
-
 def test_xvla_is_told_the_last_command_from_the_second_query_on() -> None:
     server = XVla(lambda seen: ee6d() + np.linspace(0, 0.1, 2)[:, None] * (np.arange(20) % 10 < 3))
     with talking(server) as policy:
@@ -242,19 +232,6 @@ def test_views_are_head_left_right(torch: Any, colors: str) -> None:
     for view, name in zip(policy.processor.views[0], COLORS, strict=True):
         assert view.size == (320, 240)
         assert close(color_of(view), COLORS[name][::turn], 0)
-
-
-def test_poses_come_back_as_they_went(torch: Any) -> None:
-    policy = served(torch)
-    observation, chunk = first(policy)
-    chunk = chunk.reshape(30, 2, 8)
-    ee = observation["ee"]
-    assert chunk.dtype == np.float32
-    np.testing.assert_allclose(chunk[:, 1, :3], np.tile(ee[1, :3], (30, 1)), atol=1e-6)
-    np.testing.assert_allclose(
-        np.abs(np.sum(chunk[..., 3:7] * ee[:, 3:7], axis=-1)), 1.0, atol=1e-5
-    )
-    assert chunk[:, :, 7].tolist() == [[1.0, 0.0]] * 30  # the left gripper is open
 
 
 def test_the_last_command_stands_for_the_robot(torch: Any) -> None:

@@ -15,7 +15,7 @@ from msgspec import to_builtins
 from site_fakes import Weaker, make_submission
 
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.card import check_checkpoints, check_folder, read_card, template, to_card
+from robospa.leaderboard.card import check_checkpoints, read_card, template, to_card
 from robospa.leaderboard.entries import entry_of
 from robospa.leaderboard.site import pairs_of, write_pairs
 from robospa.leaderboard.submission import read_submissions
@@ -144,13 +144,6 @@ def test_names_of_the_paper_are_reserved(name: str, team: str) -> None:
 )
 def test_names_that_say_more_are_free(name: str, team: str) -> None:
     assert to_card({**CARD_DATA, "name": name, "team": team}).name == name
-
-
-def test_folders_of_the_papers_models_are_reserved() -> None:
-    for name in ("pi0-5", "pi05", "x-vla", "xvla", "go-1", "g0-1", "rdt"):
-        with pytest.raises(BundleError, match="is that of the paper's"):
-            check_folder(name)
-    check_folder("pi0-5-our-lab")
 
 
 # ----------- two submissions on equal seeds: the numbers are those of `robospa compare` on the runs

@@ -59,12 +59,6 @@ def hand_in(root: Path, bundle: Path, card: str = CARD, **changes: Any) -> Path:
 HOME = "leaderboard/submissions/"
 
 
-def test_two_files_are_a_submission() -> None:
-    assert submitted(TWO) == ["mine"]
-    assert submitted([*TWO, Change("A", MINE + "bundle.zip")]) == ["mine"]
-    assert submitted([Change("M", "README.md"), Change("M", HOME + "README.md")]) == []
-
-
 @pytest.mark.parametrize(
     ("status", "path", "words"),
     [

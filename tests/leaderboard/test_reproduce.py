@@ -22,7 +22,6 @@ from robospa.leaderboard.reproduce import (
     Block,
     Reproduction,
     compare,
-    draw_block,
     hidden_keys,
     plan,
     read_block,
@@ -142,11 +141,6 @@ def test_a_bundle_of_few_trials_is_told_that_no_block_helps(valid: Valid) -> Non
         plan(valid, 1000)
     practice = replace(valid, manifest=replaced(valid.manifest, practice=True))
     assert plan(practice, 3) == 3
-
-
-def test_a_block_without_trials_is_never_drawn() -> None:
-    with pytest.raises(BundleError, match="a block of 0 trials"):
-        draw_block([(PICK, 1)], 0)
 
 
 BLOCK = Block({"Pick_Blocks_Size/1": (FIRST, FIRST + 7)}, "ab" * 32)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -49,13 +48,6 @@ JOINTS[1:, 0] = 0.25
 def test_every_bit_comes_back(traces: list[np.ndarray]) -> None:
     back = decode(encode(traces), "x")
     assert [(len(one), one.tobytes()) for one in back] == [(len(t), t.tobytes()) for t in traces]
-
-
-def test_smooth_actions_shrink() -> None:
-    time = np.linspace(0, 6, 500, dtype=np.float32)[:, None]
-    trace = quantize(np.sin(time + np.arange(14, dtype=np.float32)))
-    packed = zlib.compress(encode([trace]), 6)
-    assert len(packed) < 0.6 * len(zlib.compress(trace.tobytes(), 6))
 
 
 def test_actions_of_two_widths_or_off_the_grid_are_not_written() -> None:

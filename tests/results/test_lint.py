@@ -236,10 +236,6 @@ def test_successes_after_other_choices(tmp_path: Path, others: int, reads: int, 
     assert ("guessing" in "".join(f.text for f in run)) == (reads == 3)
 
 
-def test_nothing_is_found_in_an_empty_run() -> None:
-    assert severities([]) == []
-
-
 # --------- what a run shows of itself in Python: a table, a data frame, failures, a notebook's view
 
 
@@ -332,13 +328,6 @@ def test_failures_are_printed_a_line_each_and_stay_a_list(run: Run) -> None:
     assert str(FailedTrials()) == "0 failed trials"
 
 
-def test_a_failure_stays_on_its_line_below_its_heads(run: Run) -> None:
-    (one,) = run.failures()
-    other = replace(one, seed=12345, type="no attempt", evidence="it\nfell " + "far " * 100)
-    _, first, second = str(FailedTrials([one, other])).splitlines()
-    assert first.index("took") == second.index("it fell") and second.endswith("far far")
-
-
 def test_of_very_many_failures_the_first_are_printed(run: Run) -> None:
     many = FailedTrials(run.failures() * 250)
     lines = str(many).splitlines()
@@ -370,7 +359,3 @@ def test_a_notebook_shows_scores_failures_and_what_could_not_be_reached(run: Run
     html = run._repr_html_()
     assert "<table" in html and "failures: 1 target grounding" in html
     assert "cannot reach it" in html and "<script>" not in html
-
-
-def test_a_run_is_one_line_where_it_is_printed(run: Run) -> None:
-    assert repr(run).endswith("run', 1 successes in 2 of 4 trials)") and "\n" not in repr(run)

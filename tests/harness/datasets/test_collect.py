@@ -24,7 +24,6 @@ from robospa.harness.datasets import collect as module
 from robospa.harness.datasets.collect import EPISODES, CollectionResult, EpisodeStore, Order
 from robospa.harness.datasets.settings import (
     Collection,
-    command_of,
     expected_bytes,
     lists_of,
     trial_of,
@@ -101,12 +100,6 @@ def test_kills_at_any_moment_change_nothing(tmp_path: Path) -> None:
     assert contents(out) == contents(whole)
 
 
-def test_neither_the_number_of_workers_nor_their_order_matters(tmp_path: Path) -> None:
-    run(order(tmp_path / "a"))
-    module.make(order(tmp_path / "b"), lambda n: FakePool(n, 7), say=lambda line: None)
-    assert contents(tmp_path / "a") == contents(tmp_path / "b")
-
-
 def test_what_is_there_is_not_made_again(tmp_path: Path) -> None:
     run(order(tmp_path / "a"), keep=True)
     shutil.copytree(tmp_path / "a/episodes", tmp_path / "b/episodes")
@@ -134,6 +127,12 @@ def test_a_variant_that_the_expert_does_not_solve_is_named(
     (line,) = result.missing
     assert line.startswith("Pick_Blocks_Size level 1: 0 of 3 episodes; 21 seeds")
     assert "ZeroDivisionError" in line
+
+
+def test_neither_the_number_of_workers_nor_their_order_matters(tmp_path: Path) -> None:
+    run(order(tmp_path / "a"))
+    module.make(order(tmp_path / "b"), lambda n: FakePool(n, 7), say=lambda line: None)
+    assert contents(tmp_path / "a") == contents(tmp_path / "b")
 
 
 def test_no_episode_stays_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -217,22 +216,6 @@ def test_the_space_that_it_takes_is_said(tmp_path: Path) -> None:
         for frames in ("keyframes", "stride")
     )
     assert few < many / 2
-
-
-def test_a_job_says_which_frames_and_pictures_are_kept(tmp_path: Path) -> None:
-    plain = order(tmp_path).job(FIRST, 1_000_000)
-    assert (len(plain.cameras), plain.keyframes, plain.environment_state) == (3, False, False)
-    chosen = order(tmp_path, cameras="none", frames="keyframes", environment_state=True)
-    job = chosen.job(FIRST, 1_000_000)
-    assert (job.cameras, job.keyframes, job.environment_state) == ((), True, True)
-
-
-def test_the_command_of_a_data_set_is_what_would_be_typed() -> None:
-    settings = Collection(tasks="GAC", episodes=3, cameras="none", environment_state=True)
-    assert command_of(settings, "lerobot-v3") == (
-        "robospa collect --tasks GAC --episodes 3 --cameras none --environment-state "
-        "--format lerobot-v3 --out DIR"
-    )
 
 
 @pytest.fixture

@@ -93,22 +93,6 @@ def test_episodes_name_their_files_sentences_and_trial(folder: Path) -> None:
     assert np.shape(image) == (3, 1, 1) and 0 < image[0][0][0] < 1
 
 
-def test_statistics_are_those_of_all_rows(folder: Path) -> None:
-    stats = json.loads((folder / "meta/stats.json").read_text())
-    table = pq.read_table(folder / "data/chunk-000/file-000.parquet")
-    rows = np.array(table["action"].to_pylist())
-    assert set(stats["action"]) == set(STATS)
-    for name, wanted in (("mean", rows.mean(0)), ("std", rows.std(0)), ("max", rows.max(0))):
-        np.testing.assert_allclose(stats["action"][name], wanted, rtol=1e-6)
-    between = np.sort(rows, axis=0)
-    middle = len(rows) // 2
-    room = (rows.max(0) - rows.min(0)) * 1e-3
-    assert (np.array(stats["action"]["q50"]) >= between[middle - 1] - room).all()
-    assert (np.array(stats["action"]["q50"]) <= between[middle] + room).all()
-    assert stats["index"]["count"] == [len(rows)]
-    assert np.shape(stats["observation.images.head"]["mean"]) == (3, 1, 1)
-
-
 def test_stills_lie_in_the_rows_as_the_hub_keeps_images(tmp_path: Path) -> None:
     episodes = tiny_dataset(tmp_path, codec="png", count=2)
     assert not (tmp_path / "videos").exists()

@@ -15,7 +15,6 @@ from robospa.harness.datasets.maker import (
     EpisodeMaker,
     replay_end,
     subtask_of_frames,
-    subtask_texts,
 )
 from robospa.harness.datasets.manifest import DatasetManifest
 from robospa.harness.datasets.pack import pack
@@ -25,7 +24,6 @@ from robospa.harness.datasets.workers import EpisodeAttempt, EpisodeJob, attempt
 from robospa.harness.demonstrations.demonstration import DemonstrationWorld, demonstrate
 from robospa.harness.demonstrations.recorder import KEYFRAMES
 from robospa.harness.replay import ENDED
-from robospa.harness.trial import task_parts
 from robospa.observation import FEATURES, SLOTS, CameraSpec
 from robospa.protocol.policy import PolicySpec
 from robospa.tasks.events import Event
@@ -55,13 +53,6 @@ def test_a_frame_belongs_to_the_subtask_that_is_done_next() -> None:
     found = subtask_of_frames(events, np.array([0.0, 0.9, 1.0, 1.9, 2.0, 3.0]))
     assert found.dtype == np.int32 and found.tolist() == [1, 1, 0, 0, -1, -1]
     assert subtask_of_frames([], np.zeros(2)).tolist() == [-1, -1]
-
-
-def test_texts_name_the_objects() -> None:
-    parts = task_parts(TrialKey("Place_Bowls_Plates", 2, 1_000_000, split="train"))
-    texts = subtask_texts(parts.tracker, parts.scene)
-    assert len(texts) == parts.tracker.total
-    assert texts[0].startswith(f"1 of {len(texts)}: the ") and "bowl" in texts[0]
 
 
 @pytest.fixture(scope="module")

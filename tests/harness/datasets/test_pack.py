@@ -19,7 +19,6 @@ from tiny_datasets import SIZE, painted, tiny_dataset, tiny_episode, written
 from robospa.action_space import ActionSpace
 from robospa.harness.convention_check.episodes import read_episode
 from robospa.harness.datasets import lerobot
-from robospa.harness.datasets import verify as verification
 from robospa.harness.datasets.episode import DatasetEpisode
 from robospa.harness.datasets.features import layout_of
 from robospa.harness.datasets.manifest import (
@@ -34,7 +33,6 @@ from robospa.harness.datasets.manifest import (
     read_record,
 )
 from robospa.harness.datasets.pack import FORMATS, files_below, pack
-from robospa.harness.datasets.robotwin import configuration
 from robospa.harness.datasets.statistics import (
     BINS,
     QUANTILES,
@@ -43,10 +41,8 @@ from robospa.harness.datasets.statistics import (
     RangeHistogram,
     row_stats,
 )
-from robospa.harness.datasets.verify import REPLAYS, replayed_sentence, verify
-from robospa.harness.running.atomic_file import StorageError
+from robospa.harness.datasets.verify import verify
 from robospa.observation import CameraSpec
-from robospa.trial import TrialKey
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -110,13 +106,6 @@ def test_episodes_that_do_not_go_together_are_refused_in_a_sentence(tmp_path: Pa
         pack("lerobot-v3", tmp_path / "set", [], SETTINGS)
 
 
-def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
-    files = written(tmp_path, [tiny_episode(0)])
-    (tmp_path / "file").write_text("")
-    with pytest.raises(StorageError, match="cannot write"):
-        pack("lerobot-v3", tmp_path / "file" / "set", files, SETTINGS)
-
-
 def test_memory_does_not_grow_with_the_episodes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -169,12 +158,6 @@ def test_levels_of_a_task_count_on_in_one_folder(tmp_path: Path) -> None:
     assert (read.actions == episodes[2].executed[:-1]).all()
     seen = read.picture(CameraSpec("right_wrist", *SIZE), 3).astype(int)
     assert np.abs(seen - painted(22, 8)[3]).mean() < 4  # red and blue are where they were
-
-
-def test_configurations_are_the_official_names() -> None:
-    assert configuration(TrialKey("A", 1, 1)).as_posix() == "A/demo_clean"
-    key = TrialKey("A", 1, 1, mode="randomized-seen")
-    assert configuration(key).as_posix() == "A/demo_randomized"
 
 
 # ---- verification says in a sentence each what is wrong with a data set, and what its sample shows
@@ -301,18 +284,6 @@ def test_mistakes_and_midstates_are_replayed_as_what_they_are(tmp_path: Path) ->
     episodes = [mistake, midstate]
     pack("lerobot-v3", tmp_path / "set", written(tmp_path, episodes), SETTINGS)
     assert verify(tmp_path / "set", replay=Replayed(episodes)).problems == ()
-
-
-def test_another_suite_cannot_be_replayed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    tiny_dataset(tmp_path, count=2)
-    monkeypatch.setattr(verification, "SUITE", "robospa-9")
-    (problem,) = verify(tmp_path).problems
-    assert "of the suite robospa-3, and those of this version of robospa-9" in problem
-
-
-def test_the_default_sample_finds_a_twentieth_of_bad_episodes() -> None:
-    assert 0.95**REPLAYS <= 0.05 < 0.95 ** (REPLAYS - 1)
-    assert "Were 5.0% of all episodes bad" in replayed_sentence(REPLAYS, 14_000)
 
 
 # ---------------------- statistics of features: exact where they can be, and within a bin where not

@@ -12,19 +12,16 @@ import pytest
 from numpy.typing import NDArray
 from tiny_datasets import film_of, painted
 
-from robospa.harness.datasets import pictures as coding
 from robospa.harness.datasets.episode import EpisodeFilm, Stills
 from robospa.harness.datasets.lerobot import FilmFiles
 from robospa.harness.datasets.pictures import (
     CODECS,
     FPS,
-    CodecMissing,
     EpisodeFilmError,
     JoinedFilm,
     check_film,
     encode,
     film_frames,
-    require,
 )
 from robospa.observation import CameraSpec
 
@@ -70,12 +67,6 @@ def decoded(seen: EpisodeFilm | Stills) -> list[NDArray[np.uint8]]:
         keys = [t for t, frame in enumerate(frames) if frame.key_frame]
     assert all(b - a <= 2 for a, b in pairwise([*keys, FRAMES]))
     return [frame.to_ndarray(format="rgb24") for frame in frames]
-
-
-def test_an_encoder_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(coding.ENCODERS, "av1", ("libnone", {}))  # type: ignore[arg-type]
-    with pytest.raises(CodecMissing, match="no encoder libnone here: choose h264 or png or jpeg"):
-        require("av1")
 
 
 LENGTHS = (5, 1, 8)

@@ -36,7 +36,6 @@ from robospa.harness.official.checkout_world import (
     NoValidSeed,
     examine,
     numbers,
-    official_robot,
     valid_seeds,
 )
 from robospa.harness.official.sentences import SEEN, UNSEEN
@@ -129,17 +128,6 @@ def test_the_episode_number_is_the_seeds_place_in_the_list(world: CheckoutWorld)
         checkout_parts(key(8), episodes_of(keys))
 
 
-def test_an_observation_has_the_robot_as_it_was_told(world: CheckoutWorld) -> None:
-    world.load(scene())
-    world.step(act(0.25), "joint", lambda snapshot: False)
-    seen = world.observe(SPEC)
-    assert np.array_equal(seen["state"], act(0.25)) and seen["state"].dtype == np.float32
-    assert seen["ee"].shape == (2, 8) and seen["ee"][1, 0] == np.float32(0.3)
-    snapshot = world.snapshot()
-    assert (snapshot.time, snapshot.joints[0][0], snapshot.poses) == (0.2, 0.25, {})
-    assert "state" not in world.observe(replace(SPEC, state="none", cameras=()))
-
-
 @pytest.mark.parametrize("seed", [100001, 100002, 100003])
 def test_a_scene_that_is_not_valid_officially_is_no_seed(world: CheckoutWorld, seed: int) -> None:
     with pytest.raises(SceneUnstable, match=f"seed {seed} is not valid in the checkout: "):
@@ -218,12 +206,6 @@ def test_flags_that_fall_are_undone() -> None:
         ("subtask_undone", 0), ("subtask_done", 1), ("success", -1)
     ]  # fmt: skip
     assert tracker.update(replace(here, flags=(False, True), success=True)) == ()
-
-
-def test_robots_have_their_official_names() -> None:
-    assert official_robot("aloha-agilex") == ["aloha-agilex"]
-    assert official_robot("piper") == ["piper", "piper", 0.6]
-    assert official_robot("piper+franka-panda:0.7") == ["piper", "franka-panda", 0.7]
 
 
 def settings(checkout: Path, **more: object) -> EvaluationSettings:

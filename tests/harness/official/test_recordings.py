@@ -21,7 +21,6 @@ from robospa.harness.official.recordings import (
     RecordingReplay,
     chosen,
     find_recordings,
-    in_checkout,
     key_of,
     rebuilt,
     recording_of,
@@ -154,15 +153,6 @@ def test_an_episode_of_ours_names_its_trial() -> None:
     assert key_of(episode({"task": "Rank_Blocks_Color"})) is None
     with pytest.raises(NotStored, match="its trial cannot be made"):
         rebuilt(OfficialRecording(Path("x"), 0), episode({**about, "task": "No_Such_Task"}))
-
-
-def test_a_checkout_makes_any_scene_from_seed_and_number() -> None:
-    recording = OfficialRecording(Path("x"), 4, ("Click_Bell_Repeat", 2), 7)
-    key, parts = in_checkout(recording, episode())
-    assert (key.seed, parts.scene.facts) == (7, {"episode": 4})
-    assert parts.scene.suite == "official-checkout"
-    with pytest.raises(NotStored, match=r"seed\.txt has no seed"):
-        in_checkout(replace(recording, seed=None), episode())
 
 
 def test_the_summary_counts_and_gives_reasons() -> None:

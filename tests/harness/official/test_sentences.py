@@ -18,11 +18,8 @@ from robospa.harness.official.sentences import (
     CheckoutError,
     OfficialSentences,
     Texts,
-    fits,
     overlap,
     read_checkout,
-    report,
-    sentence_of,
 )
 from robospa.harness.official.slots import NoOfficialSentence
 from robospa.harness.running import evaluate
@@ -52,13 +49,6 @@ def clicks(seed: int = 1, look: int = 0, pack: str = "") -> Scene:
     )
     facts = {"order": ["object_1", "object_0"]}
     return Scene(*ORDER, seed, "aloha-agilex", "clean", items, facts)
-
-
-def test_a_template_fits_with_all_placeholders_or_without_any_arm() -> None:
-    keys = {"A", "B", "a", "b"}
-    assert fits("{A} {B}", keys) and fits("{b}{A}{B}{a}", keys)
-    assert not fits("{A} {B} {a}", keys) and not fits("{A}", keys) and not fits("", keys)
-    assert fits("nothing", ())
 
 
 def test_things_without_an_official_model_go_by_their_plain_name(said: OfficialSentences) -> None:
@@ -153,13 +143,6 @@ def test_the_overlap_counts_equal_and_alike_templates() -> None:
     found = overlap(Texts(("Lift the cup.", "Press {A} twice."), tests))
     assert (found.tests, found.equal, found.near) == (3, 1, 2)
     assert found.examples == ("lift  the cup.",)
-
-
-def test_the_overlap_of_all_variants_is_reported(said: OfficialSentences) -> None:
-    data = report(said)
-    assert (data["tests"], data["equal"]) == (6, 1)
-    assert json.loads(json.dumps(data))["variants"]["Pick_Blocks_Size 2"]["equal"] == 1
-    assert "of 6 test templates of 4 variants, 1 stand in training" in sentence_of(said)
 
 
 def request(folder: Path, **more: object):  # type: ignore[no-untyped-def]

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from robospa.geometry import Pose
-from robospa.harness.official.slots import SLOTS, NoOfficialSentence, arms, official_values
+from robospa.harness.official.slots import SLOTS, official_values
 from robospa.tasks.catalog import tasks
 from robospa.tasks.scene import Scene, SceneObject
 
@@ -161,12 +161,3 @@ def test_placeholders_of(made: Scene, expected: dict[str, str]) -> None:
 def test_every_official_task_has_placeholders_and_no_other() -> None:
     fitting = {n for n in tasks() if any(fnmatchcase(n, pattern) for pattern in SLOTS)}
     assert fitting == {name for name, task in tasks().items() if task.dimension != "basic"}
-
-
-def test_another_task_has_no_official_sentence() -> None:
-    with pytest.raises(NoOfficialSentence, match="Basic_Color_Blocks is no official task"):
-        official_values(scene("Basic_Color_Blocks", 1))
-
-
-def test_a_single_small_letter_is_an_arm() -> None:
-    assert arms(["A", "a", "col_dir", "e"]) == {"a", "e"}

@@ -83,14 +83,6 @@ def test_the_thing_farther_left_moves() -> None:
     assert switched(early, 0, SWITCHES) is early
 
 
-def test_the_microwave_floats() -> None:
-    items = block("a", "red"), SceneObject("m", "microwave", Pose((0.0, 0.1, 0.74)), fixed=True)
-    made = scene("Click_Bell_Open_Microwave_Place_Object", *items, microwave="m")
-    found = switched(made, 0, chosen("floating-microwave"))
-    assert found.objects[0] is items[0]
-    assert found.objects[1].pose.position == pytest.approx((0.0, 0.1, 0.80))
-
-
 @pytest.mark.parametrize("mode", ["clean", "randomized"])
 def test_the_wall_leaves_a_gap_and_the_stand_is_pale(mode: str) -> None:
     """Also where the table stands lower."""

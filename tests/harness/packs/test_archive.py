@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_archive import THINGS, make_archive
 
 from robospa.harness.packs import archive as cache
 from robospa.harness.packs.archive import Archive, ArchiveError, note, open_archive
@@ -72,11 +71,6 @@ def test_a_folder_is_named_noted_or_in_the_environment(
     assert open_archive(tmp_path / "named").root == tmp_path / "named"
 
 
-def test_a_checkout_that_holds_the_assets_will_do(tmp_path: Path) -> None:
-    (tmp_path / "assets" / "embodiments").mkdir(parents=True)
-    assert open_archive(tmp_path).root == tmp_path / "assets"
-
-
 @pytest.mark.parametrize(
     ("there", "visual", "collision"),
     [
@@ -115,10 +109,6 @@ def test_a_part_may_lie_on_another_disk(tmp_path: Path) -> None:
     (tmp_path / "archive").mkdir()
     (tmp_path / "archive" / "objects").symlink_to(elsewhere.parent)
     assert open_archive(tmp_path / "archive").files(CAN).visual == elsewhere / "base3.glb"
-
-
-def test_things_are_found(tmp_path: Path) -> None:
-    assert open_archive(make_archive(tmp_path, [], ("clutter",))).clutter() == THINGS
 
 
 class Maker:
@@ -161,15 +151,3 @@ def test_a_damaged_entry_is_thrown_away(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="was damaged: start again"):
         cache.load_arrays(entry)
     assert cache.load_arrays(cache.cached((file,), "how", make))["a"].tolist() == [2, 2, 2]
-
-
-def test_nothing_half_written_is_left_under_the_entry(tmp_path: Path) -> None:
-    file = tmp_path / "a"
-    file.write_bytes(b"mesh")
-
-    def broken() -> cache.Arrays:
-        raise OSError("no space left")
-
-    with pytest.raises(OSError, match="no space"):
-        cache.cached((file,), "how", broken)
-    assert list(cache.cache_folder().glob("*.npz")) == []

@@ -9,14 +9,13 @@ import pytest
 from made_archive import READS_MESHES, make_archive
 from mesh_writers import Piece, hollow_staves, merged, write_glb
 
-from robospa.harness.packs import convex, mesh_files
+from robospa.harness.packs import convex
 from robospa.harness.packs.archive import ArchiveError, open_archive
 from robospa.harness.packs.convex import CORNERS, connected_parts, convex_pieces
 from robospa.harness.packs.index import index
 from robospa.harness.packs.mesh_files import RawMesh, read_shapes
 from robospa.harness.packs.visuals import shaded, thinned
 from robospa.tasks.objects import meshes as m
-from robospa.tasks.official import official_assets, official_models
 from robospa.tasks.shapes import Mesh
 
 Arrays = tuple[np.ndarray, np.ndarray]
@@ -32,7 +31,6 @@ def volume(piece: Arrays) -> float:
 
 
 BOX = arrays(m.box_mesh((0.5, 0.5, 0.5)))
-BEYOND = arrays(m.box_mesh((0.5, 0.5, 0.5), (1.0, 0.0, 0.0)))
 
 
 def test_each_mesh_is_one_piece_and_its_parts_only_where_they_are_asked_for() -> None:
@@ -41,10 +39,6 @@ def test_each_mesh_is_one_piece_and_its_parts_only_where_they_are_asked_for() ->
     assert volume(whole) == pytest.approx(2 * 2 * 6)
     pieces = convex_pieces(connected_parts(*apart))
     assert [volume(piece) for piece in pieces] == pytest.approx([8.0, 8.0])
-
-
-def test_meshes_that_touch_stay_two_pieces() -> None:
-    assert [volume(p) for p in convex_pieces([BOX, BEYOND])] == pytest.approx([1.0, 1.0])
 
 
 def test_faces_that_only_share_places_are_one_piece() -> None:
@@ -89,12 +83,6 @@ def test_a_thinned_mesh_keeps_its_place_and_outside() -> None:
     assert volume((thin.vertices, thin.faces)) == pytest.approx(4 / 3 * np.pi, rel=0.08)
 
 
-def test_a_small_mesh_is_left_as_it_is() -> None:
-    thin = thinned(textured(BOX), 1000)
-    assert len(thin.faces) == len(BOX[1])
-    assert volume((thin.vertices, thin.faces)) == pytest.approx(1.0)
-
-
 def test_normals_are_sharp_at_edges_and_smooth_where_it_is_round() -> None:
     _, normals, _, triangles = shaded(textured(BOX))
     assert np.abs(normals).max(axis=1) == pytest.approx(np.ones(len(normals)))
@@ -118,11 +106,6 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROBOSPA_CACHE", str(tmp_path / "cache"))
 
 
-def test_what_should_be_hollow_is_listed() -> None:
-    found = {a for a in official_assets() for model in official_models(a) if model.hollow}
-    assert found == {*HOLLOW}
-
-
 @pytest.mark.parametrize("height", [0.1, 0.02])
 def test_depth_is_that_of_the_floor(height: float) -> None:
     """Of staves about y, their floor a tenth of their height thick."""
@@ -142,9 +125,3 @@ def test_a_model_in_one_node_is_filled_and_named_with_its_tasks(root: Path) -> N
     assert {*found.filled} == tasks
     assert {*found.filled.values()} == {("011_dustbin/base0",)}
     assert "Put_Bottles_Dustbin (011_dustbin)" in found.filled_text()
-
-
-def test_without_the_library_nothing_is_said(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mesh_files, "reads_meshes", lambda: False)
-    monkeypatch.setattr(convex, "colliding_pieces", None)
-    assert not index(open_archive(root)).filled

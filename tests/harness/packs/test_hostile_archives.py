@@ -127,11 +127,6 @@ def test_a_pack_names_the_tasks_that_cannot_run(root: Path) -> None:
     assert "model_data0.json' is missing" in found["Pick_Cans_Relational"]
 
 
-def test_a_thing_whose_picture_is_not_there_is_drawn_without(root: Path) -> None:
-    (root / THING / "textured.png").unlink()
-    assert OfficialPack(open_archive(root)).model("objaverse", {"thing": "marker/0"}).skin
-
-
 @pytest.mark.parametrize(
     ("harm", "sentence"),
     [

@@ -14,7 +14,7 @@ from mesh_writers import Piece, empty_png, glb, glb_bytes, write_glb, write_obj,
 
 from robospa.harness.packs import mesh_files as checks
 from robospa.harness.packs.archive import Archive, ArchiveError
-from robospa.harness.packs.mesh_files import RawMesh, check_glb, read_mesh, read_shapes
+from robospa.harness.packs.mesh_files import RawMesh, check_glb, read_mesh
 
 pytestmark = READS_MESHES
 
@@ -44,12 +44,6 @@ def test_several_meshes_become_one_with_one_picture(tmp_path: Path, ending: str)
     seen = dict(zip(map(tuple, mesh.vertices.tolist()), colours(mesh), strict=True))
     for place, expected in (((1, 0, 0), RED), ((3, 2, 2), GREEN)):
         assert np.abs(np.subtract(seen[place], expected)).max() <= 2
-
-
-def test_shapes_of_a_file_stay_apart(tmp_path: Path) -> None:
-    write_glb(tmp_path / "objects" / "two.glb", TWO, textured=False)
-    shapes = read_shapes(tmp_path / "objects" / "two.glb", Archive(tmp_path).inside)
-    assert [len(vertices) for vertices, _ in shapes] == [4, 4]
 
 
 def with_picture(picture: bytes) -> bytes:
@@ -184,9 +178,3 @@ def test_hostile_glb_files_are_refused_in_a_sentence(
 def test_files_that_are_none_are_refused(tmp_path: Path, content: bytes, message: str) -> None:
     with pytest.raises(ArchiveError, match=message):
         check_glb(written(tmp_path, content))
-
-
-def test_a_torn_file_is_refused(tmp_path: Path) -> None:
-    whole = glb_bytes(*glb([TRIANGLE]))
-    with pytest.raises(ArchiveError, match="promises"):
-        check_glb(written(tmp_path, whole[:-40]))

@@ -222,14 +222,6 @@ def test_failing_first_trials_cannot_be_had_back_for_ever(tmp_path: Path) -> Non
     assert [len(r.retries) for r in results] == [2] * FIRST  # the third error is final
 
 
-def test_errors_that_only_count_end_the_run_in_failures(tmp_path: Path) -> None:
-    Optional.broken = True
-    with ServerThread(policy_factory=Optional) as server:
-        evaluate(request(server.url, tmp_path, policy_errors="count"))
-    run = read_run(tmp_path)
-    assert {r.end for r in run.records.values()} == {"policy_error"} and not run.missing
-
-
 def test_a_wrong_option_is_mended_while_no_trial_has_a_result(tmp_path: Path) -> None:
     Optional.broken = True
     with ServerThread(policy_factory=Optional) as server, pytest.raises(RunAborted):

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fake_runs import trial_record
 from held_fakes import ScriptedExecutor, ThreadExecutor
 from numpy.typing import NDArray
 from run_fakes import SPEC, FakePolicy, FakeWorld, parts
@@ -18,7 +17,6 @@ from run_fakes import SPEC, FakePolicy, FakeWorld, parts
 from robospa.harness.policy_calls import Stopwatch
 from robospa.harness.running.heartbeat import ComputeLock, HeartbeatSender, MonitoredPolicy
 from robospa.harness.running.runner import Runner, RunOptions
-from robospa.harness.running.status import Autoscaler
 from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.trial import run_trial
 from robospa.protocol.connection_limits import ServerOptions
@@ -104,19 +102,6 @@ def test_trials_of_one_worker_overlap_and_their_records_are_those_of_trials_alon
         assert (record.attempts, record.latency["p50"] > 0) == (1, True)
         assert record.timing["queueing"] >= 0 and record.timing["processor"] > 0
     assert executor.ended == 2  # Stop came to both places
-
-
-def test_a_connection_belongs_to_one_trial_at_a_time(tmp_path: Path) -> None:
-    with Site(meet=3) as site:
-        run(tmp_path / "run", site, concurrent_trials=3)
-    assert len(site.calls) == 3
-    for calls in site.calls:
-        current = ""
-        for call in calls:
-            what, trial = call.split()
-            current = trial if what == "reset" else current
-            assert trial == current
-    assert sum(call.startswith("reset") for calls in site.calls for call in calls) == len(KEYS)
 
 
 def test_a_server_with_room_for_one_connection_loses_no_trial(tmp_path: Path) -> None:
@@ -205,16 +190,3 @@ def test_one_waiting_for_its_turn_is_not_stuck() -> None:
     lock.release()
     thread.join()
     assert seen == ["simulating"]
-
-
-def test_workers_are_added_by_what_all_their_trials_compute() -> None:
-    """Two workers with 3 trials each, of which every one computes for a third of its time."""
-    record = trial_record(KEYS[0], True, wall_time=3.0, timing={"processor": 1.0})
-    scaler = Autoscaler(2, 16, cores=2, concurrent_trials=3)
-    for _ in range(6):
-        scaler.add(record)
-    assert scaler.scale_up(saturated=False) == 0
-    alone = Autoscaler(2, 16, cores=2)
-    for _ in range(6):
-        alone.add(record)
-    assert alone.scale_up(saturated=False) == 2

@@ -15,11 +15,9 @@ from robospa.harness.running.policy_probe import (
     ProbedPolicy,
     check_fit,
     over_budget,
-    probe_policies,
     read_map,
     warnings_of,
 )
-from robospa.harness.running.worker import WorkerConfig
 from robospa.protocol.server import ServerThread
 from robospa.results.lint import lint_run
 from robospa.results.records.manifest import RunError
@@ -60,26 +58,6 @@ def test_maps_that_cannot_be(tmp_path: Path, value: Any, reason: str) -> None:
         read_map(write(tmp_path, value), ["Pick_A", "Pick_B", "Pick_C", "Pick_D"], KNOWN)
 
 
-def test_every_server_is_asked_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[str] = []
-
-    def opened(target: str, options: dict[str, Any]) -> FakePolicy:
-        asked.append(target)
-        return FakePolicy(replace(SPEC, name=target))
-
-    monkeypatch.setattr("robospa.harness.running.policy_probe.open_policy", opened)
-    config = WorkerConfig(tmp_path, "", policies={"Pick_A": "a", "Pick_B": "b"})
-    found = probe_policies(config, KEYS)
-    assert {task: probed.spec.name for task, probed in found.items()} == {
-        "Pick_A": "a",
-        "Pick_B": "b",
-    }
-    assert asked == ["a", "b"]
-    asked.clear()
-    probe_policies(replace(config, policies={}, policy="one"), KEYS)
-    assert asked == ["one"]
-
-
 def test_a_policy_for_another_robot() -> None:
     def probed(**spec: Any) -> ProbedPolicy:
         return ProbedPolicy("ws://a", replace(SPEC, **spec), {"options": {"embodiment": "x"}})
@@ -97,14 +75,6 @@ def test_a_policy_for_another_robot() -> None:
 
 def greeting(checkpoint: str = "step 1000", **more: Any) -> ProbedPolicy:
     return ProbedPolicy("ws://a", replace(SPEC, checkpoint=checkpoint), {"dialect": "test", **more})
-
-
-def test_warnings_are_told_once_each() -> None:
-    policies = {
-        "Pick_A": greeting(warnings=["one", "two"]),
-        "Pick_B": greeting(warnings=["two", "three"]),
-    }
-    assert warnings_of(policies, {}, 1.0) == ["one", "two", "three"]
 
 
 def test_a_server_that_names_no_checkpoint_is_warned_about_once() -> None:

@@ -26,15 +26,6 @@ def test_a_retry_waits_for_its_time_and_then_goes_first() -> None:
     assert (second.key, third.key, third.attempt) == (KEYS[1], first.key, 2)
 
 
-def test_a_task_that_only_pauses_is_not_due() -> None:
-    queue = TrialQueue(KEYS[:1], fake_task_of)
-    work = queue.take("Pick_Fake", 0.0)
-    assert work is not None
-    queue.requeue(work, due=5.0)
-    assert (queue.due(4.0), list(queue.due(5.0))) == ({}, ["Pick_Fake"])
-    assert queue.waiting() == ("Pick_Fake",)
-
-
 def test_the_level_that_takes_longest_goes_first() -> None:
     slow, quick = TrialKey("Pick_Fake", 1, 7), TrialKey("Pick_Fake", 2, 7)
     queue = TrialQueue([slow, quick, replace(slow, seed=8), replace(quick, seed=8)], fake_task_of)
@@ -72,8 +63,3 @@ def test_the_catalog_is_asked_for_the_task_alone(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr("robospa.harness.trial.build_scene", built)
     found = task_finder(TASK_PARTS)(TrialKey("Put_Bottles_Dustbin", 3, 100000))
     assert (found.name, found.levels[3].subtasks) == ("Put_Bottles_Dustbin", 3)
-
-
-def test_other_parts_have_their_own_task() -> None:
-    found = task_finder("run_fakes:parts")(TrialKey("Put_Bottles_Dustbin", 3, 100000))
-    assert found.summary == "fake"

@@ -90,15 +90,6 @@ def test_a_cluster_that_is_no_more_is_told_at_once(
         check_address("auto")
 
 
-def test_a_worker_that_fits_on_no_node_is_refused(
-    tmp_path: Path, home: tuple[Any, Any, Path]
-) -> None:
-    wish = Compute(executor="ray", address=home[0].address, cpus_per_worker=64.0)
-    with pytest.raises(NoCluster, match=r"64 CPUs that a worker takes \(the largest has 1 CPUs\)"):
-        RayExecutor(config(tmp_path / "run"), wish)
-    assert not (tmp_path / "run").exists()
-
-
 def test_the_slurm_example_is_valid_shell() -> None:
     script = Path(__file__).parents[3] / "docs" / "examples" / "slurm_ray.sh"
     assert subprocess.run(["bash", "-n", script], capture_output=True).stderr == b""

@@ -148,20 +148,6 @@ def test_a_policy_error_that_was_withdrawn_is_no_result(
     assert read_records(tmp_path)[KEY] == WITHDRAWN[max(order)]
 
 
-def test_the_loss_with_most_attempts_is_the_last(tmp_path: Path) -> None:
-    lost = replace(RECORD, end="infrastructure", success=False)
-    write(tmp_path, replace(lost, retries=(RetryRow("deadline"),) * 2))
-    write(tmp_path, replace(lost, retries=(RetryRow("deadline"),)))
-    assert len(read_records(tmp_path)[KEY].retries) == 2
-
-
-def test_replace_file_leaves_nothing_behind_when_it_fails(tmp_path: Path) -> None:
-    (tmp_path / "x").mkdir()
-    with pytest.raises(StorageError, match=r"cannot write .*x: Is a directory"):
-        replace_file(tmp_path / "x", b"data")
-    assert [p.name for p in tmp_path.iterdir()] == ["x"]
-
-
 def test_actions_survive_their_file(tmp_path: Path) -> None:
     actions = np.linspace(0, 1, 28, dtype=np.float32).reshape(2, 14)
     write_actions(tmp_path, KEY, actions, "joint")
@@ -222,13 +208,6 @@ def test_a_file_system_without_locks_is_no_reason_to_stop(
     monkeypatch.setattr(fcntl, "flock", refuse)
     with run_lock(tmp_path):
         pass
-
-
-def test_nonsense_in_the_lock_file_is_not_repeated(tmp_path: Path) -> None:
-    with run_lock(tmp_path):
-        (tmp_path / LOCK).write_bytes(b"\xff\x1b[2J\x00")
-        with pytest.raises(RunError, match=r"^another process is running"), run_lock(tmp_path):
-            pass
 
 
 # ------------------------- what reaches the disk, in which order, and what is left when it does not
@@ -303,11 +282,6 @@ def test_a_full_disk_is_one_sentence_with_folder_and_free_space(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_that_cannot_be_written_is_named() -> None:
-    with pytest.raises(StorageError, match=r"cannot write /proc/run/trials/0000\.jsonl: "):
-        RecordWriter(Path("/proc/run"))
-
-
 def test_what_a_killed_worker_left_behind_is_settled(tmp_path: Path) -> None:
     writer = RecordWriter(tmp_path)
     writer.write(RECORD)
@@ -340,7 +314,7 @@ TOKENS += [{"a": {}}, {"1": [1]}, "success", "infrastructure", [None], "NaN", fl
 TOKENS += [float("inf"), "100000", {"kind": "success"}, [{"kind": 3}], {"seeds": 1}]
 RAW = [b"[" * 3000, b"{" * 300, b'"', b"\\ud800", b"1e999", b"-", b"9" * 5000, b"NaN", b"\n"]
 RAW += b'\x00 \xff\xfe null true {"a": , ] } \xff\xff\xff\xff PK\x01\x02'.split()
-EXAMPLES = {"bundle": 12, "run": 30}
+EXAMPLES = {"bundle": 30, "run": 30}
 """Of these kinds; of the others a hundred."""
 
 
@@ -523,7 +497,3 @@ def test_a_damaged_file_is_read_or_refused(name: str, readers: Readers) -> None:
     once()
     if name not in ("archive", "bundle"):  # a checksum covers all of it
         assert ends["read"]
-
-
-def test_an_archive_that_is_not_damaged_is_read(readers: Readers) -> None:
-    readers.archive(readers.bundle)

@@ -45,13 +45,6 @@ def test_the_trials_are_those_of_the_settings() -> None:
     ]  # fmt: skip
 
 
-def test_the_saved_settings_name_the_folder_that_was_chosen() -> None:
-    request = make_request(settings("hold", tasks="Pick_Blocks_Size", trials=1))
-    assert request.settings is not None
-    assert request.settings.out == request.config.folder
-    assert make_request(settings("hold"), keys=KEYS).settings is None, "they say not which trials"
-
-
 def test_client_options_from_a_file(tmp_path: Path) -> None:
     path = tmp_path / "client.json"
     path.write_text('{"horizon": 25, "execute": 10, "names": "head:cam"}')
@@ -100,26 +93,6 @@ def test_a_server_with_one_state_for_all_gets_one_worker(scheme: str) -> None:
     assert request.config.one_trial == {url: "h:1"}
     with pytest.raises(SettingsError, match="workers is 2, but this server keeps one state"):
         make_request(settings(url, workers=2), keys=KEYS)
-
-
-def test_several_such_servers_get_a_worker_each() -> None:
-    urls = ["xpolicylab://h:1", "xpolicylab://h:2", "xpolicylab://h:2?space=ee"]
-    many = updated(EvaluationSettings(), {"policy": urls[:2]})
-    assert make_request(many, keys=KEYS).options.workers == 2
-    with pytest.raises(SettingsError, match="these 2 servers keep one state"):
-        make_request(updated(many, {"policy": urls, "workers": 3}), keys=KEYS)
-
-
-def test_beside_such_a_server_others_may_have_more_workers() -> None:
-    mixed = updated(EvaluationSettings(), {"policy": ["xpolicylab://h:1", "ws://h:2"]})
-    request = make_request(updated(mixed, {"workers": 4}), keys=KEYS)
-    assert request.options.workers == 4
-    assert request.config.one_trial == {"xpolicylab://h:1": "h:1"}
-
-
-def test_a_ray_cluster_gets_no_more_either() -> None:
-    request = make_request(settings("xpolicylab://h:1", executor="ray"), keys=KEYS)
-    assert request.compute.workers == 1
 
 
 @pytest.mark.parametrize(

@@ -221,13 +221,6 @@ def test_where_nothing_can_be_drawn_or_written_one_sentence_ends_the_filming(
     assert done.stop and "MB left" in done.trouble
 
 
-def test_a_folder_that_is_gone_is_not_made_again(tmp_path: Path) -> None:
-    record = recorded(tmp_path / "run", KEY)
-    (tmp_path / "run").rename(tmp_path / "moved")
-    done = FilmMaker(config(tmp_path / "run")).make(record)
-    assert done.trouble and not (tmp_path / "run").exists()
-
-
 # --- a whole run ----------------------------------------------------------------------------------
 
 

@@ -64,11 +64,6 @@ def test_every_trial_is_run_once_and_alike_with_one_worker_or_two(tmp_path: Path
     assert sorted(r.key for r in results(tmp_path / "two")) == keys()
 
 
-def test_action_traces_lie_beside_the_records(tmp_path: Path) -> None:
-    go(tmp_path, "FakePolicy", keys(2))
-    assert len(list((tmp_path / "actions").glob("*.npz"))) == 2
-
-
 def test_a_lost_line_is_tried_again_from_the_same_seed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -95,16 +90,6 @@ def test_a_trial_that_cannot_be_run_is_missing_and_not_a_failure(tmp_path: Path)
 def test_a_server_that_stays_away_stops_the_run(tmp_path: Path) -> None:
     with pytest.raises(RunAborted, match="3 trials in a row"):
         go(tmp_path, "GonePolicy", keys(8), RunOptions(attempts=1, give_up=3))
-
-
-def test_nan_is_the_policys_failure_and_not_retried(tmp_path: Path) -> None:
-    records, _ = go(tmp_path, "NanPolicy", keys(2))
-    assert [(r.end, r.attempts) for r in records] == [("policy_error", 1)] * 2
-
-
-def test_an_unstable_seed_is_not_tried_twice(tmp_path: Path) -> None:
-    records, _ = go(tmp_path, "FakePolicy", [TrialKey("Pick_Fake", 1, 666)])
-    assert [(r.end, r.attempts) for r in records] == [("infrastructure", 1)]
 
 
 def test_a_model_that_cannot_be_made_is_not_tried_twice(tmp_path: Path) -> None:
@@ -277,20 +262,6 @@ def test_two_servers_share_a_run_and_each_keeps_its_task(tmp_path: Path) -> None
     assert about.target == first.url
     assert [server.target for server in about.equals] == [second.url]
     assert all("queue" in r.latency and r.latency["batch"] == 1 for r in found.records.values())
-
-
-def test_a_map_gives_every_server_its_own_task(tmp_path: Path) -> None:
-    with Site("a") as first, Site("b") as second, Site("b") as third:
-        path = tmp_path / "map.json"
-        where = {TASKS[0]: first.url, TASKS[1]: [second.url, third.url], TASKS[2]: first.url}
-        path.write_text(json.dumps(where))
-        run(words(tmp_path / "run", "--policy-map", str(path)))
-    assert (len(first.tasks), len(second.tasks) + len(third.tasks)) == (16, 8)
-    assert set(second.tasks) | set(third.tasks) == {TASKS[1]}
-    assert first.switches <= 3  # one change of task, and each worker may help out at the end
-    about = read_run(tmp_path / "run").manifest.about.policies
-    assert about[TASKS[1]].equals[0].target == third.url
-    assert not about[TASKS[0]].equals
 
 
 def test_a_server_that_dies_leaves_its_trials_to_the_other(tmp_path: Path) -> None:

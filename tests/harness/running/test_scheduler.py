@@ -104,13 +104,6 @@ def switches(simulation: Simulation, target: str) -> int:
     return sum(a != b for a, b in pairwise(tasks))
 
 
-def test_one_server_sees_every_task_once() -> None:
-    simulation = Simulation(schedule(keys(), equal("a")), 4, {"a": 0.1})
-    simulation.run()
-    assert switches(simulation, "a") == len(TASKS) - 1
-    assert simulation.scheduler.servers["a"].switches == len(TASKS) - 1
-
-
 @pytest.mark.parametrize("servers", [2, 3, 4])
 def test_equal_servers_share_the_tasks_and_hardly_change_them(servers: int) -> None:
     names = [f"s{n}" for n in range(servers)]
@@ -130,14 +123,6 @@ def test_with_a_server_for_every_task_no_server_sees_a_change() -> None:
     assert all(job.target == f"ws://{job.work.key.task}" for job in simulation.order)
 
 
-def test_a_slow_server_loses_workers_to_a_quick_one() -> None:
-    simulation = Simulation(
-        schedule(keys(), equal("slow", "quick")), 8, {"slow": 1.0, "quick": 0.1}
-    )
-    simulation.run()
-    assert simulation.share()["quick"] > 0.7
-
-
 def test_a_server_that_gets_slow_is_left_and_asked_again_later() -> None:
     speed = {"a": 0.2, "b": 0.2}
 
@@ -150,14 +135,6 @@ def test_a_server_that_gets_slow_is_left_and_asked_again_later() -> None:
     again = Counter(job.target for job in simulation.settled[-300:])
     assert slow["b"] > 10 * slow["a"]
     assert again["a"] > 100
-
-
-def test_a_server_with_twice_the_work_gets_more_workers() -> None:
-    where = {"Pick_A": "small", "Press_B": "big", "Push_C": "big"}
-    scheduler = schedule(keys(("Pick_A", "Press_B", "Push_C")), lambda task: (where[task],))
-    first = [scheduler.next(0.0) for _ in range(9)]
-    counts = Counter(job.target for job in first if job is not None)
-    assert counts == {"big": 6, "small": 3}
 
 
 def test_a_worker_stays_where_it_is_if_the_other_server_is_not_clearly_better() -> None:
@@ -241,14 +218,6 @@ def test_a_server_that_came_back_as_another_one_is_left_out() -> None:
     scheduler.lost(other, 1e6, "incompatible", "another spec, too")
     scheduler.requeue(other, 1e6, False)
     assert set(scheduler.tasks_without_server()) == set(TASKS)
-
-
-def test_trials_lost_for_other_reasons_say_nothing_of_the_server() -> None:
-    scheduler = schedule(keys(), equal("a", "b"))
-    job = scheduler.next(0.0)
-    assert job is not None
-    assert scheduler.lost(job, 0.0)
-    assert scheduler.servers[job.target].up
 
 
 def test_a_server_with_one_state_for_all_does_one_trial_at_a_time() -> None:

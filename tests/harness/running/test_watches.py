@@ -5,7 +5,6 @@ from __future__ import annotations
 from fake_runs import record, trial_record
 
 from robospa.harness.running.attempts import FIRST, IN_A_ROW, ErrorVerdict, ErrorWatch, ProblemWatch
-from robospa.results.records.action_problems import error_kind
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
@@ -67,11 +66,6 @@ def test_lost_trials_say_nothing_of_the_policy() -> None:
     assert len(verdict.withdrawn) == FIRST
 
 
-def test_numbers_do_not_make_another_error() -> None:
-    assert error_kind("nan in action 1, 0x7f3a") == error_kind("nan in action -2.5e3, 0x11bc")
-    assert error_kind("no camera a") != error_kind("no camera b")
-
-
 def watched(actions: int, end: str = "step_limit") -> list[list[str]]:
     """What is said after each of seven trials of 130 actions, so many of them out of reach."""
     watch = ProblemWatch()
@@ -87,7 +81,3 @@ def test_many_unreachable_actions_are_said_once_after_five_trials() -> None:
         "warning: in the first 5 trials 640 of 650 actions (98 %) ask for a pose out of reach"
     )
     assert "are poses in the world frame" in said[4][0] and "action 1: left pose" in said[4][0]
-
-
-def test_few_and_lost_trials_say_nothing() -> None:
-    assert not any(watched(3)) and not any(watched(130, "infrastructure"))

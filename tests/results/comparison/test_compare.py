@@ -17,7 +17,6 @@ from robospa.results.comparison.compare import (
 from robospa.results.paper.columns import published_results
 from robospa.results.records.runs import by_setting
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.report.report import make_report
 from robospa.results.scoring.models import IncomparableError, ModelResults, results_of_run
 from robospa.results.statistics.intervals import difference, paired_difference, wilson
 from robospa.results.statistics.significance import boschloo, mcnemar_mid_p
@@ -85,15 +84,6 @@ def test_a_run_against_the_paper(tmp_path: Path) -> None:
     assert cell.q < 0.001
     assert (group(found, "overall", 1).variants, group(found, "overall", 1).listed) == (1, 56)
     assert any("Only 1 of 280 variants" in note for note in found.notes)
-
-
-def test_two_published_models() -> None:
-    found = compare_results(published_results("pi0.5"), published_results("X-VLA"))
-    assert found.first == "π0.5"
-    best = group(found, "overall", 5)
-    assert 100 * best.estimate.value == pytest.approx(22.25 - 19.87, abs=0.02)
-    assert best.variants == best.listed == 56
-    assert {g.q for g in found.groups if g.label == "MIP" and g.level == 5} == {1.0}
 
 
 def test_onta_is_the_difference_of_rates_on_its_own_scale(tmp_path: Path) -> None:
@@ -251,18 +241,5 @@ def test_modes_stand_side_by_side_with_their_paired_difference(sides: list[Model
         assert gap.text.startswith("-37.5 [-")
 
 
-def test_robots_and_splits_together_have_names_of_both(tmp_path: Path) -> None:
-    run = make_run(tmp_path / "run", [*trials("clean", 6), *trials("randomized", 3, "indirect")])
-    table = by_axis([results_of_run(part, str(i)) for i, part in enumerate(by_setting(run))])
-    assert table is not None
-    assert table.heads[:2] == ("clean heldout", "randomized indirect")
-
-
 def test_runs_of_one_setting_have_no_such_table(sides: list[ModelResults]) -> None:
     assert by_axis(sides[:1]) is None and by_axis([sides[0], sides[0]]) is None
-
-
-def test_the_report_shows_it_first(tmp_path: Path) -> None:
-    run = make_run(tmp_path / "run", [*trials("clean", 6), *trials("randomized", 3)])
-    first = make_report(run).tables[0].table
-    assert first.name == "sr-by-mode" and len(first.rows) == 3

@@ -23,12 +23,10 @@ from robospa.results.comparison.sample_size import (
     published_variances,
     sample_size,
     trials_for,
-    trials_paired,
     trials_unpaired,
 )
 from robospa.results.figures.curves import draw_latency_curves
 from robospa.results.figures.series import styled
-from robospa.results.paper.published import LEVELS, load
 from robospa.results.records.runs import read_run
 from robospa.results.scoring.models import IncomparableError, ModelResults, results_of_run
 
@@ -142,22 +140,9 @@ def test_of_one_variant_it_is_the_binomial_formula() -> None:
     assert trials_for(0.25, 0.05) == 385
 
 
-def test_a_tenth_of_the_benchmark_tells_the_overall_rate_to_two_points() -> None:
-    found = published_variances([(task, level) for task in load().tasks for level in LEVELS])
-    assert all(half_width(variance, 10) < 0.02 for variance in found.values())
-    enough = {model: trials_for(variance, 0.025) for model, variance in found.items()}
-    assert enough == {"RDT": 2, "GO-1": 3, "pi0.5": 4, "X-VLA": 4}
-
-
 def test_unrelated_seeds() -> None:
     assert trials_unpaired(0.2, 0.3) == 292
     assert trials_unpaired(0.2, 0.25) == trials_unpaired(0.25, 0.2) == 1092
-
-
-def test_equal_seeds_save_trials_where_outcomes_correlate() -> None:
-    needed = [trials_paired(0.2, 0.3, phi) for phi in (0.0, 0.25, 0.5)]
-    assert needed == sorted(needed, reverse=True)
-    assert needed[0] == pytest.approx(trials_unpaired(0.2, 0.3), rel=0.02)
 
 
 def test_discordant_share_by_hand() -> None:

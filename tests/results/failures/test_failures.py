@@ -74,25 +74,8 @@ def test_a_lost_trial_is_no_failure_of_the_policy() -> None:
     assert label(failed("GAC", [], end="infrastructure")) is None
 
 
-def test_a_success_has_no_type() -> None:
-    record = failed("GAC", [])
-    assert label(TrialRecord(**{**vars(record), "success": True, "end": "success"})) is None
-
-
 def test_an_answer_that_cannot_be_executed_has_its_own_type() -> None:
     assert kind(failed("GAC", [], end="policy_error")) == "invalid_action"
-
-
-def test_nothing_tried() -> None:
-    found = label(failed("GAC", []))
-    assert found is not None
-    told = (found.kind, found.step, found.time, found.video_seconds)
-    assert told == ("no_attempt", 100, None, None)
-
-
-def test_a_record_of_an_older_version_says_so() -> None:
-    found = label(failed("GAC", [], roles=None))
-    assert found is not None and "older version" in found.evidence
 
 
 # -- spatial -----------------------------------------------------------------------------------
@@ -135,18 +118,6 @@ def test_collisions_with_clutter_change_no_type() -> None:
         assert label(without) == label(among)
     nothing = label(failed("GAC", knocked))
     assert nothing is not None and nothing.kind == "no_attempt"
-
-
-def test_of_a_drop_the_fall_is_the_evidence() -> None:
-    rows = [(2, "closed", "target", 0, "touching"), (5, "dropped", "target")]
-    found = label(failed("GAC", rows, video="videos/x.mp4"))
-    assert found is not None
-    assert (found.time, found.step, found.video_seconds) == (5.0, 3, 2.5)
-
-
-def test_without_a_video_there_is_no_moment_in_it() -> None:
-    found = label(failed("GAC", [(5, "grasped", "other")]))
-    assert found is not None and found.video_seconds is None
 
 
 # -- procedural --------------------------------------------------------------------------------
@@ -265,11 +236,6 @@ def test_counts_leave_out_what_is_no_failure() -> None:
         "GAC": {"target_grounding": 2, "no_attempt": 1},
         "OCE": {"manipulation": 1},
     }
-
-
-def test_another_grouping_is_refused() -> None:
-    with pytest.raises(ValueError, match="task, category, variant"):
-        distribution(RUN, "robot")
 
 
 def test_counts_by_variant_and_as_a_table() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,21 +14,20 @@ from fake_runs import trial_record
 
 from robospa.results.comparison.compare import compare_results
 from robospa.results.paper import published, rounding
-from robospa.results.paper.check import Check, checks, errata
+from robospa.results.paper.check import checks, errata
 from robospa.results.paper.columns import Column, published_column, published_results, run_column
 from robospa.results.paper.origin import (
     ORIGIN,
     RANKED,
     banner,
     origin_of,
-    pieces,
     pieces_of,
     printed_note,
     told,
 )
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.paper.tables import make_tables
-from robospa.results.records.manifest import RunManifest, RunSettings
+from robospa.results.records.manifest import RunManifest
 from robospa.results.records.runs import Run
 from robospa.results.report.report import make_report
 from robospa.results.scoring.models import IncomparableError
@@ -37,9 +35,8 @@ from robospa.results.statistics.samples import onta_of_percent
 from robospa.results.tables import Table, to_csv
 from robospa.schema import read
 from robospa.tasks.scene import SUITE as OURS
-from robospa.trial import CATEGORIES, CATEGORY_NAMES, SPATIAL, TrialKey
+from robospa.trial import CATEGORIES, CATEGORY_NAMES, TrialKey
 
-FOLDER = Path(published.__file__).parent
 DATA = load()
 
 
@@ -51,23 +48,6 @@ def test_the_data_hold_every_task_model_and_level() -> None:
     for (_, metric), table in DATA.per_task.items():
         sizes[metric] += sum(len(row) for row in table.rows.values())
     assert sizes == {"sr": 1120, "onta": 480, "ps": 640}
-
-
-def test_every_file_names_the_table_it_was_read_from() -> None:
-    for path in FOLDER.glob("*.json"):
-        data = json.loads(path.read_text())
-        source = data.get("source") or list(data["tables"])
-        labels = source.values() if isinstance(source, dict) else source
-        labels = [labels] if isinstance(labels, str) else list(labels)
-        assert labels, path.name
-        assert all(label.startswith("tab:") for label in labels), path.name
-
-
-def test_candidates_and_subtasks_per_level() -> None:
-    assert DATA.tasks["Pick_Blocks_Distance"].counts == (3, 6, 8, 9, 10)
-    assert DATA.tasks["Pick_Seals_Multi_View"].counts == (3, 4, 4, 4, 4)
-    subtasks = {t.counts for t in DATA.tasks.values() if t.category not in SPATIAL}
-    assert subtasks == {LEVELS}
 
 
 def test_all_cells_of_all_result_tables_are_walked_once() -> None:
@@ -152,11 +132,6 @@ def test_the_paper_shades_the_highest_printed_values() -> None:
                 assert list(shaded) == [m for m, v in values.items() if v == max(values.values())]
 
 
-def test_a_check_says_what_was_printed_and_what_follows() -> None:
-    check = Check("tab:x", "main", "CAC", "GO-1", "L1", 24.2, 29.3, reason="why")
-    assert str(check) == "main, CAC, GO-1, L1: printed 24.2, recomputed 29.3 (why)"
-
-
 KNOWN = [  # from a separate check of the paper's tables: table, row, model, column, printed, right
     ("main", "CAC", "GO-1", "L1", 24.2, 29.25),
     ("main", "CAC", "GO-1", "L5", 2.6, 2.25),
@@ -213,25 +188,6 @@ def test_the_errata_are_the_known_ones_and_nothing_else() -> None:
         check = found[tuple(place)]  # type: ignore[index]
         assert check.printed == printed
         assert check.recomputed == pytest.approx(right, abs=0.081)  # a drop is of rounded values
-
-
-def test_the_numbers_themselves_give_reasons_away() -> None:
-    said = {(c.table, c.row, c.model, c.column): c.reason for c in errata()}
-    assert said["main", "RRR", "X-VLA", "Drop"] == "printed 40.4 - 14.2 is 26.2"
-    assert "no 8 whole success rates" in said["main", "CAC", "GO-1", "L1"]
-    assert "21 would fit" in said["main", "CAC", "GO-1", "L5"]
-    assert "Click Bell Open Microwave Place Object were 15" in said["main", "CAC", "X-VLA", "L1"]
-    assert said["main", "overall", "GO-1", "L1"] == "follows from CAC as printed"
-    assert "SR 35" in said["per-task ONTA", "Pick Mixed Objects Distance B", "pi0.5", "L4"]
-
-
-def test_a_new_misprint_in_a_table_is_found(edited: Any) -> None:
-    def change(data: dict[str, Any]) -> None:
-        data["rows"]["GAC"]["RDT"][1] = 8.4
-
-    edited("main.json", change)
-    new = [c for c in errata() if c.row == "GAC"]
-    assert [(c.column, c.printed, c.recomputed) for c in new] == [("L5", 8.4, 4.8)]
 
 
 def test_a_new_misprint_in_a_task_spreads_to_what_follows_from_it(edited: Any) -> None:
@@ -372,14 +328,6 @@ def test_what_is_official_is_said_piece_by_piece(world: str) -> None:
     assert all(any(text in piece for piece in found.other) for text in other)
     sentence = told(column_in(world).results)
     assert all(text in sentence for text in (*official, *other, WORLDS[world][0]))
-
-
-def test_of_what_a_manifest_does_not_say_nothing_is_official() -> None:
-    found = pieces("official-1", RunSettings())
-    assert found.official == (
-        "tasks, rules, thresholds, step limits",
-        "the robot's joints and cameras",
-    )
 
 
 @pytest.mark.parametrize("world", WORLDS)

@@ -158,16 +158,6 @@ def test_a_run_has_one_line_for_each_kind_and_the_first_example() -> None:
     }
 
 
-def test_what_was_not_run_does_not_count() -> None:
-    lost = trial_record(KEY, end="infrastructure", diagnostics={**BELOW, "text_budget": 9})
-    assert problem_lines([lost]) == [] and problem_data([lost])["actions"] == 0
-
-
-@pytest.mark.parametrize("value", ["many", None, True, -3, 2.5])
-def test_a_foreign_count_is_none(value: object) -> None:
-    assert problem_lines([trial_record(KEY, diagnostics={"clipped_joints": value})]) == []
-
-
 def test_no_attempt_names_the_reason() -> None:
     roles = {"roles": {"object_0": [0]}}
     found = label(trial_record(KEY, steps=100, diagnostics={**BELOW, **roles}))

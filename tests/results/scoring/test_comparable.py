@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,6 @@ from robospa.results.report.run_card import facts
 from robospa.results.scoring.comparable import (
     comparable_table,
     executed_chunks,
-    median,
 )
 from robospa.results.scoring.models import results_of_run
 from robospa.results.scoring.repeats import (
@@ -29,7 +27,6 @@ from robospa.results.scoring.repeats import (
     policy_error_lines,
     repeat_lines,
     repeats_text,
-    was_repeated,
     worst_case,
 )
 from robospa.trial import TrialKey
@@ -98,16 +95,6 @@ def test_rates_over_the_trials_that_compare_stand_beside_those_over_all(run: Any
     assert found["CVR", "L1"][2].low == pytest.approx(43.85, abs=0.01)  # Wilson, 3 of 3
 
 
-def test_variants_without_such_trials_are_in_neither_rate(tmp_path: Path) -> None:
-    other = [led("Pick_Breads_Multi_View", 1, n, 0, 0.01) for n in range(4)]
-    other = [TrialRecord(**{**vars(one), "category": "CVR"}) for one in other]
-    table = comparable_table([results_of_run(make_run(tmp_path / "run", [*RECORDS, *other]))])
-    assert table is not None
-    line = next(row for row in table.rows if row.label == "L1")
-    assert [cell.text for cell in line.cells][4] == "3 of 8"
-    assert line.cells[0].value == 75
-
-
 def test_the_table_is_in_all_that_a_report_writes(run: Any, tmp_path: Path) -> None:
     folder = write_report(make_report(run), tmp_path / "report")
     for name in ("report.html", "report.md", "tables/tables.csv", "tables/comparable.tex"):
@@ -155,12 +142,6 @@ def test_what_is_no_count_of_chunks_counts_nothing(entry: object) -> None:
     assert not executed_chunks(made)
 
 
-def test_the_median_is_the_lower_one() -> None:
-    assert [median(Counter(x)) for x in ((), (3,), (1, 2), (1, 1, 9), (1, 9, 9))] == [
-        *(None, 3, 1, 1, 9)
-    ]
-
-
 # ------------------------- repeated trials are counted, and the worst that they may hide is bounded
 
 
@@ -184,13 +165,6 @@ def test_retries_survive_the_file_and_old_lines_have_none() -> None:
     old = to_line(trial_record(attempts=3)).replace('"retries":[],', "")
     assert "retries" not in old
     assert from_line(old) == trial_record(attempts=3)
-
-
-def test_a_trial_that_the_policy_never_got_was_not_repeated() -> None:
-    assert was_repeated(trial_record(retries=(AWAY, LOST), attempts=3))
-    assert not was_repeated(trial_record(retries=(AWAY,), attempts=2))
-    assert was_repeated(trial_record(attempts=2))  # an older version: nobody knows why
-    assert not was_repeated(trial_record())
 
 
 def test_in_the_worst_case_every_repeated_trial_had_failed() -> None:

@@ -16,9 +16,9 @@ from robospa.results.records.runs import Run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.report.page import write_report
 from robospa.results.report.report import make_report
-from robospa.results.report.score_table import loss_lines, print_scores
+from robospa.results.report.score_table import print_scores
 from robospa.results.scoring.models import results_of_run
-from robospa.results.scoring.scores import IDLE, Scores, score, score_run, to_json
+from robospa.results.scoring.scores import IDLE, Scores, score, score_run
 from robospa.results.statistics.intervals import METHODS, wilson
 from robospa.trial import TrialKey
 
@@ -79,15 +79,6 @@ def test_the_overall_value_is_the_mean_of_categories_not_of_tasks() -> None:
     assert ("procedural", 1) not in found.dimensions
 
 
-def test_the_mean_over_levels() -> None:
-    easy, hard = trial("A", "GAC", 0, 1), trial("A", "GAC", 0, 0)
-    hard = replace(hard, key=replace(hard.key, level=5), candidates=6)
-    found = scores([easy, hard])
-    assert values(found.tasks["A"], "sr") == 0.5
-    assert values(found.categories["GAC", 0], "sr") == 0.5
-    assert found.levels == (1, 5)
-
-
 def test_a_variant_without_a_result_leaves_the_averages_open() -> None:
     found = scores([trial("A", "GAC", 0, 1)], extra=(TrialKey("Z", 1, 0),))
     assert found.cells["Z", 1].values == dict.fromkeys(("sr", "sr1", "onta", "onta1"))
@@ -95,12 +86,6 @@ def test_a_variant_without_a_result_leaves_the_averages_open() -> None:
     assert values(found.overall[1], "onta") is None
     assert found.overall[1].bounds("sr") == (0.5, 1.0)
     assert found.overall[1].missing == 1
-
-
-def test_onta_is_open_where_candidate_counts_differ() -> None:
-    second = replace(trial("A", "GAC", 1, 1), candidates=3)
-    cell = scores([trial("A", "GAC", 0, 1), second]).cells["A", 1]
-    assert cell.values["onta"] is None
 
 
 def test_intervals_by_the_chosen_method_leave_all_values_as_they_are() -> None:
@@ -154,14 +139,6 @@ def test_rates_are_of_results_and_bounds_of_all_that_is_listed(run: Run) -> None
     assert overall.bounds("sr") == pytest.approx(((5 / 8 + 3 / 8) / 2, (7 / 8 + 5 / 8) / 2))
 
 
-def test_json_has_counts_and_bounds_of_every_metric(run: Run) -> None:
-    found = to_json(score_run(run))["variants"]
-    assert found[PICK]["L1"]["missing"] == 2
-    assert found[PICK]["L1"]["sr_bounds"] == [0.625, 0.875]
-    assert found[PICK]["L1"]["onta_bounds"] == [0.25, 0.75]
-    assert found[PUT]["L1"]["ps_bounds"] == [0.5625, 0.8125]
-
-
 def test_the_terminal_marks_incomplete_variants_and_says_why(
     run: Run, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -172,13 +149,6 @@ def test_the_terminal_marks_incomplete_variants_and_says_why(
     assert "SR would be 62.5 and SR@1 62.5, if all had succeeded 87.5 and 87.5" in text
     assert f"missing 2: {WHY}" in text
     assert "missing 2: not run yet" in text
-
-
-def test_many_reasons_are_summed_up(tmp_path: Path) -> None:
-    records = [lost(PICK, 1, seed, f"reason {chr(97 + seed)}") for seed in range(9)]
-    lines = loss_lines(write(tmp_path / "run", [*records, record(PICK, 1, 9, 1)]))
-    assert len(lines) == 6
-    assert lines[-1] == "missing 4: for 4 other reasons"
 
 
 def test_every_table_of_a_report_names_what_is_missing(report: Path) -> None:
