@@ -29,7 +29,7 @@ LONG = (
     "test_server_faults",
     "test_runner",
     "test_client",
-    "test_heartbeat",
+    "test_held_trials",
     "test_figures",
     "test_ranking",
     "test_report",

@@ -5,13 +5,19 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from fake_runs import outcomes, write
+from run_fakes import FakePolicy
 
-from robospa.harness.cli.main import main
+from robospa.harness import machine_check
+from robospa.harness.cli.main import COMMANDS, main
+from robospa.protocol.server import ServerThread
 from robospa.results.comparison.compare import heads_of
 from robospa.results.paper.columns import published_results
+from robospa.tasks.catalog import build_scene, tasks
 
 
 def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
@@ -102,3 +108,186 @@ def test_lint_of_the_paper_fails_with_its_findings(capsys: pytest.CaptureFixture
     code, text, _ = run(capsys, "report", "paper", "--lint")
     assert code == 1
     assert "8 errors, 0 warnings" in text
+
+
+# ------------------------------------------------------------ `robospa paper` from the command line
+
+
+def run_paper(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as stop:
+        main(("paper", *words))
+    said = capsys.readouterr()
+    code = stop.value.code
+    return (code if isinstance(code, int) else 0), said.out, said.err
+
+
+def test_all_tables_are_written_and_the_errata_told(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    code, out, _ = run_paper(capsys, "--out", str(tmp_path / "paper"), "--no-figures")
+    assert code == 0
+    assert "Overall average" in out
+    assert "2747 printed cells walked; 22 do not follow" in out
+    assert "main, RRR, X-VLA, Drop: printed 28.2, recomputed 26.2" in out
+    names = {path.name for path in (tmp_path / "paper").iterdir()}
+    assert {"tables.md", "tables.tex", "tables.html", "tables.csv", "main.tex"} <= names
+
+
+def test_what_is_printed_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    words = ("--out", str(tmp_path / "p"), "--table", "basic", "--format", "md", "--json")
+    code, out, _ = run_paper(capsys, *words)
+    found = json.loads(out)
+    assert code == 0 and found["checked"] == 2747 and len(found["errata"]) == 22
+    assert found["files"] == [str(tmp_path / "p" / "tables.md")]
+    drop = next(e for e in found["errata"] if (e["row"], e["column"]) == ("RRR", "Drop"))
+    assert (drop["printed"], drop["recomputed"]) == (28.2, 26.2)
+    assert found["table"]["name"] == "basic" and found["table"]["rows"][0]["cells"]
+
+
+def test_figures_are_drawn_of_all_columns(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[list[str], Path]] = []
+
+    def draw(runs: Any, columns: Any, folder: Path) -> list[SimpleNamespace]:
+        asked.append(([c.title for c in columns], folder))
+        return [SimpleNamespace(name="one")]
+
+    monkeypatch.setattr("robospa.results.report.report.draw_figures", draw)
+    code, out, _ = run_paper(capsys, "--out", str(tmp_path / "p"), "--format", "csv")
+    assert code == 0
+    assert asked == [(["RDT", "GO-1", "π0.5", "X-VLA"], tmp_path / "p" / "figures")]
+    assert "1 figures in" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--format", "pdf"), "no format is called 'pdf'; there are md, tex, html, csv and all"),
+        (("--table", "mian"), "no table is called 'mian'; there are main,"),
+        (("--mark", "bold"), "no mark is called 'bold'; there are tied, highest, none"),
+        (("--run", "nowhere"), "nowhere is not a run"),
+    ],
+)
+def test_mistakes_are_one_sentence_and_write_nothing(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, words: tuple[str, ...], said: str
+) -> None:
+    code, out, err = run_paper(capsys, "--out", str(tmp_path / "p"), *words)
+    assert (code, out) == (1, "")
+    assert said in err
+    assert len(err.splitlines()) == 1
+    assert not (tmp_path / "p").exists()
+
+
+def test_a_run_stands_beside_the_published(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    trials = {
+        "task": "Pick_Blocks_Size",
+        "level": 1,
+        "embodiment": "aloha-agilex",
+        "mode": "clean",
+        "split": "heldout",
+        "seeds": [100000],
+    }
+    folder = tmp_path / "run"
+    (folder / "trials").mkdir(parents=True)
+    settings = {"policy": {"spec": {"name": "mine"}}}
+    (folder / "run.json").write_text(json.dumps({"settings": settings, "trials": [trials]}))
+    words = ("--out", str(tmp_path / "p"), "--run", str(folder), "--no-figures")
+    code, out, _ = run_paper(capsys, *words)
+    assert code == 0
+    assert "mine: of 56 tasks 55 at L1, 56 at L5 were not run" in " ".join(out.split())
+
+
+# --------------- help as wide as the terminal, completion by the shell, and JSON for other programs
+
+
+def output(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    with pytest.raises(SystemExit) as end:
+        main(words)
+    out, err = capsys.readouterr()
+    assert not end.value.code, err
+    return out
+
+
+@pytest.mark.parametrize("columns", [60, 80, 118])
+def test_help_is_as_wide_as_the_terminal(
+    columns: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(columns))
+    widths = [len(line) for line in output(capsys, "eval", "--help").splitlines()]
+    assert columns - 16 < max(widths) <= columns
+
+
+def test_the_list_of_commands_is_not_cut(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    text = " ".join(output(capsys, "--help").split()).partition("Evaluate a policy:")[2]
+    assert "..." not in text
+    assert [summary for summary in COMMANDS.values() if summary not in text] == []
+
+
+def test_options_of_eval_stand_in_the_groups_of_its_settings(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    text = output(capsys, "eval", "--help-all")
+    sections = {
+        part.splitlines()[0].rstrip(":"): part for part in text.split("\n\n") if ":\n" in part
+    }
+    assert list(sections)[-7:] == [
+        "Selection", "Simulation", "Timing", "Connection", "Retries", "Compute", "Recording"
+    ]  # fmt: skip
+    assert "--embodiment" in sections["Selection"] and "--video" in sections["Recording"]
+    assert "--resume" in sections["Options"] and "--tasks" not in sections["Options"]
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("robospa ta", "tasks"),
+        ("robospa eval --emb", "--embodiment --embodiments"),
+        ("robospa eval --split ", "heldout train indirect"),
+        ("robospa eval --video f", "failures first"),
+        ("robospa submit ve", "verify"),
+    ],
+)
+def test_the_shell_completes(
+    line: str,
+    expected: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("_ROBOSPA_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", line)
+    monkeypatch.setenv("COMP_CWORD", str(line.count(" ")))
+    assert output(capsys).split() == expected.split()
+
+
+def test_tasks_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    listed = json.loads(output(capsys, "tasks", "--json"))
+    assert [row["name"] for row in listed] == list(tasks())
+    assert listed[0]["levels"]["5"] == {"candidates": 6, "subtasks": 1, "steps": 150}
+    scene = json.loads(output(capsys, "tasks", "pick blocks size", "--level", "2", "--json"))
+    assert scene["digest"] == build_scene("Pick_Blocks_Size", 2, 100000).digest
+    assert set(scene["instructions"]) == {"train", "heldout", "indirect"}
+    assert scene["plan"][0]["skill"] == "Pick"
+
+
+def test_a_server_s_checks_as_json(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        machine_check,
+        "run_checks",
+        lambda: iter([machine_check.SystemCheck("simulator", True, "fine")]),
+    )
+    with ServerThread(policy_factory=FakePolicy) as server:
+        found = json.loads(
+            output(capsys, "check", server.url, "--trials", "0", "--load-seconds", "0", "--json")
+        )
+        machine = json.loads(output(capsys, "check", "--json"))
+    assert found["url"] == server.url and found["passed"]
+    assert {"name", "passed", "detail"} == set(found["checks"][0])
+    assert machine["checks"] == [{"name": "simulator", "ok": True, "detail": "fine", "fix": ""}]
