@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
 from fake_runs import outcomes, write
@@ -15,7 +13,6 @@ from run_fakes import FakePolicy
 from robospa.harness import machine_check
 from robospa.harness.cli.main import COMMANDS, main
 from robospa.protocol.server import ServerThread
-from robospa.results.comparison.compare import heads_of
 from robospa.results.paper.columns import published_results
 from robospa.tasks.catalog import build_scene, tasks
 
@@ -50,22 +47,6 @@ def test_a_run_against_the_paper_has_a_banner_and_names_over_its_columns(
     code, text, _ = run(capsys, "compare", folder, "pi05", "--json")
     found = json.loads(text)
     assert code == 0 and found["banner"] == banner and len(found["cells"]) == 1
-
-
-def test_two_runs_have_no_banner(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    for name, found in (("one", [1, 1, 0]), ("two", [1, 0, 0])):
-        write(tmp_path / name, outcomes("Pick_Blocks_Size", 1, found))
-    code, text, _ = run(capsys, "compare", str(tmp_path / "one"), str(tmp_path / "two"))
-    assert code == 0
-    assert text.startswith("SR of one minus two")
-    assert "only one  only two" in text
-
-
-def test_names_over_columns_stay_apart() -> None:
-    long = "an-evaluation-of-many-words"
-    assert heads_of("one", "two") == ["one", "two"]
-    assert heads_of(f"{long}-1", f"{long}-2") == ["…n-of-many-words-1", "…n-of-many-words-2"]
-    assert heads_of(f"a-{long}", f"b-{long}") == ["first", "second"]
 
 
 @pytest.mark.parametrize("name", ["pi05", "pi0.5", "π0.5", "PI0_5"])
@@ -144,22 +125,6 @@ def test_what_is_printed_as_json(capsys: pytest.CaptureFixture[str], tmp_path: P
     assert found["table"]["name"] == "basic" and found["table"]["rows"][0]["cells"]
 
 
-def test_figures_are_drawn_of_all_columns(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    asked: list[tuple[list[str], Path]] = []
-
-    def draw(runs: Any, columns: Any, folder: Path) -> list[SimpleNamespace]:
-        asked.append(([c.title for c in columns], folder))
-        return [SimpleNamespace(name="one")]
-
-    monkeypatch.setattr("robospa.results.report.report.draw_figures", draw)
-    code, out, _ = run_paper(capsys, "--out", str(tmp_path / "p"), "--format", "csv")
-    assert code == 0
-    assert asked == [(["RDT", "GO-1", "π0.5", "X-VLA"], tmp_path / "p" / "figures")]
-    assert "1 figures in" in out
-
-
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -177,27 +142,6 @@ def test_mistakes_are_one_sentence_and_write_nothing(
     assert said in err
     assert len(err.splitlines()) == 1
     assert not (tmp_path / "p").exists()
-
-
-def test_a_run_stands_beside_the_published(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    trials = {
-        "task": "Pick_Blocks_Size",
-        "level": 1,
-        "embodiment": "aloha-agilex",
-        "mode": "clean",
-        "split": "heldout",
-        "seeds": [100000],
-    }
-    folder = tmp_path / "run"
-    (folder / "trials").mkdir(parents=True)
-    settings = {"policy": {"spec": {"name": "mine"}}}
-    (folder / "run.json").write_text(json.dumps({"settings": settings, "trials": [trials]}))
-    words = ("--out", str(tmp_path / "p"), "--run", str(folder), "--no-figures")
-    code, out, _ = run_paper(capsys, *words)
-    assert code == 0
-    assert "mine: of 56 tasks 55 at L1, 56 at L5 were not run" in " ".join(out.split())
 
 
 # --------------- help as wide as the terminal, completion by the shell, and JSON for other programs
@@ -227,20 +171,6 @@ def test_the_list_of_commands_is_not_cut(
     text = " ".join(output(capsys, "--help").split()).partition("Evaluate a policy:")[2]
     assert "..." not in text
     assert [summary for summary in COMMANDS.values() if summary not in text] == []
-
-
-def test_options_of_eval_stand_in_the_groups_of_its_settings(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    text = output(capsys, "eval", "--help-all")
-    sections = {
-        part.splitlines()[0].rstrip(":"): part for part in text.split("\n\n") if ":\n" in part
-    }
-    assert list(sections)[-7:] == [
-        "Selection", "Simulation", "Timing", "Connection", "Retries", "Compute", "Recording"
-    ]  # fmt: skip
-    assert "--embodiment" in sections["Selection"] and "--video" in sections["Recording"]
-    assert "--resume" in sections["Options"] and "--tasks" not in sections["Options"]
 
 
 @pytest.mark.parametrize(

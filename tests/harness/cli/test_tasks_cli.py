@@ -21,7 +21,7 @@ from typer.testing import CliRunner, Result
 from robospa import extras
 from robospa.harness.cli import tasks as commands
 from robospa.harness.cli.main import COMMANDS, command_of, main
-from robospa.harness.cli.tasks import describe_skill, per_level, tasks
+from robospa.harness.cli.tasks import describe_skill, tasks
 from robospa.harness.pictures import gallery
 from robospa.harness.seeds.attempt import Attempt
 from robospa.protocol.server import ServerThread
@@ -59,12 +59,6 @@ def test_a_scene_is_described_with_both_instructions() -> None:
     assert all(item.name in done.output for item in scene.objects)
 
 
-def test_a_split_shows_only_its_instruction() -> None:
-    done = run(NAME, "--split", "train", "--no-frame")
-    assert "instruction (train)" in done.output
-    assert "instruction (heldout)" not in done.output
-
-
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -82,14 +76,6 @@ def test_a_bad_argument_is_refused_in_one_sentence(arguments: tuple[str, ...], s
     plain = " ".join(done.output.replace("│", " ").split())
     assert done.exit_code == 2
     assert said in plain
-
-
-@pytest.mark.parametrize(
-    ("values", "text"),
-    [([150] * 5, "150"), ([2, 3, 4, 5, 6], "2..6"), ([3, 6, 8, 9, 12], "3 6 8 9 12"), ([7], "7")],
-)
-def test_the_values_of_all_levels_are_shown_briefly(values: list[int], text: str) -> None:
-    assert per_level(values) == text
 
 
 @pytest.mark.parametrize(
@@ -139,12 +125,6 @@ def test_the_gallery_of_one_task_has_all_its_levels(tmp_path: Path) -> None:
     done = run(NAME, "--gallery", "--out", str(path))
     assert done.exit_code == 0, done.output
     assert "5 variants in" in done.output and path.stat().st_size < 1_000_000
-
-
-def test_a_gallery_of_what_does_not_exist_is_refused_at_once(tmp_path: Path) -> None:
-    done = run("Pick_Blocks_Size,Pick_Nothing", "--gallery", "--out", str(tmp_path / "sheet.jpg"))
-    assert done.exit_code == 2 and "Pick_Nothing" in done.output
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_settled_scene_skips_seeds_that_do_not_rest() -> None:
@@ -228,10 +208,6 @@ def numbers() -> Iterator[tuple[str, typing.Any]]:
 
 
 NUMBERS = dict(numbers())
-
-
-def test_there_are_such_flags() -> None:
-    assert {"check --timeout", "submit block --trials", "seeds --count"} < set(NUMBERS)
 
 
 @pytest.mark.parametrize("name", NUMBERS)
