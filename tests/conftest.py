@@ -92,6 +92,13 @@ def same_figures_once(monkeypatch: pytest.MonkeyPatch, drawn_figures: Path) -> N
 
 
 @pytest.fixture
+def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages without pictures."""
+    for page in ("results.report.report", "leaderboard.site"):
+        monkeypatch.setattr(f"robospa.{page}.draw", lambda *given: [])
+
+
+@pytest.fixture
 def world_asked_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Evaluations ask their world about itself in this process: one of its own costs a second."""
     from robospa.harness.running import evaluate

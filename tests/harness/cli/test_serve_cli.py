@@ -265,6 +265,7 @@ def test_every_command_that_reports_has_json() -> None:
     assert having == {name for name, _ in commands()} - set(SILENT)
 
 
+@pytest.mark.usefixtures("no_figures")
 @pytest.mark.parametrize("line", HERE.values(), ids=HERE)
 def test_standard_output_is_one_json_value(line: str, tmp_path: Path) -> None:
     for name, found in (("one", [1, 1, 0]), ("two", [1, 0, 0])):
