@@ -118,12 +118,18 @@ MEANINGS = {
         "the claim as a whole and in every cell; rates "
         f"{100 * LIE:g} points lower everywhere would have shown with at least "
         f"{100 * LEAST_POWER:g} %. Smaller gains, such as the best of many runs on the public "
-        "seeds, may hide below that, and nothing shows what runs behind the server. Only models "
-        "with this badge are ranked, and only in cells where a lie of "
-        f"{100 * CELL_LIE:g} points in that cell alone would have shown with as much."
+        "seeds, may hide below that, and nothing shows what runs behind the server. Ranks are for "
+        f"cells where a lie of {100 * CELL_LIE:g} points in that cell alone would have shown with "
+        "as much."
     ),
 }
 """What a badge proves, and what it does not."""
+HOW_REPRODUCED = (
+    "Reproduction is done by a maintainer, once the submission is merged and its team asks for it "
+    "in the pull request: the maintainer publishes a commitment to hidden scenes, runs them on the "
+    "team's server, then publishes the scenes and what came out. Only then is the model ranked."
+)
+"""Who reproduces an entry, when and how: the one story of page and documentation."""
 UNKNOWN = "not stated"
 
 

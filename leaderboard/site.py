@@ -25,6 +25,7 @@ from robospa.leaderboard.agreement import CELL_LIE
 from robospa.leaderboard.bundle import IN_REPOSITORY, BundleError
 from robospa.leaderboard.entries import (
     BADGES,
+    HOW_REPRODUCED,
     MEANINGS,
     Entry,
     all_entries,
@@ -93,6 +94,7 @@ def index_page(entries: Sequence[Entry]) -> str:
         entries=[{"slug": e.slug, "name": e.name, "badge": BADGES[e.badge]} for e in entries],
         origin=ORIGIN,
         badge_meanings=[(badge, name, MEANINGS[badge]) for badge, name in BADGES.items()],
+        how_reproduced=HOW_REPRODUCED,
         suites=suites(entries),
         cell_lie=f"{100 * CELL_LIE:g}",
         data={

@@ -61,7 +61,7 @@ class ScoreCard:
     lines: tuple[str, ...]
 
 
-class Panel(NamedTuple):
+class LevelPanel(NamedTuple):
     """Success by level in a category as shapes in a field of 120 x 70: y is 10 for 100 %, 60 for 0.
     `lines` have the paths of SR, its intervals and SR@1 of each model that has any."""
 
@@ -225,7 +225,7 @@ def _rate(metric: str, found: Estimate | None, lack: str) -> ShownRate:
     return ShownRate(METRIC_NAMES[metric], f"{text} %", f"95 % interval {interval}", bar)
 
 
-def panels(models: Sequence[ModelResults]) -> list[Panel]:
+def panels(models: Sequence[ModelResults]) -> list[LevelPanel]:
     """Success by level of `models`, a panel a category that any of them has."""
     made = []
     for category in (*CATEGORIES, *BASIC):
@@ -241,7 +241,9 @@ def panels(models: Sequence[ModelResults]) -> list[Panel]:
                 paths = (_path({n: 100 * e.value for n, e in one.items()}) for one in (sr, first))
                 lines.append((number, next(paths), "".join(bars), next(paths)))
         if lines:
-            made.append(Panel(category, CATEGORY_NAMES[category], tuple(lines), _path(guessed)))
+            made.append(
+                LevelPanel(category, CATEGORY_NAMES[category], tuple(lines), _path(guessed))
+            )
     return made
 
 

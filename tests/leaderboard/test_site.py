@@ -6,6 +6,7 @@ import json
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
+from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from bundle_fakes import CARD, CARD_TEXT, PICK, REFERENCE, SEEDS, make_run
 from site_fakes import REPLAYED, REPRODUCED, change, make_submission, make_valid
 
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.entries import BADGES, all_entries, published_entries
+from robospa.leaderboard.entries import BADGES, HOW_REPRODUCED, all_entries, published_entries
 from robospa.leaderboard.packing import Packing, pack
 from robospa.leaderboard.site import build, index_page, write_model, write_site
 from robospa.leaderboard.submission import add, left_out, read_submission, read_submissions, slug_of
@@ -76,6 +77,11 @@ def test_a_submission_has_its_badges_and_their_evidence(kept: Path, tmp_path: Pa
     assert len(data_of(page)["trials"]) == 1
     film = tmp_path / "out" / "models" / "fake-1" / data_of(page)["trials"][0]["video"]
     assert film.is_file()
+
+
+def test_who_reproduces_an_entry_is_told_alike_on_the_page_and_in_the_documentation() -> None:
+    pages = (index_page([]), (Path(__file__).parents[2] / "docs" / "leaderboard.md").read_text())
+    assert all(HOW_REPRODUCED in unescape(" ".join(page.split())) for page in pages)
 
 
 def test_a_replay_with_other_final_states_has_a_badge_of_its_own(tmp_path: Path) -> None:

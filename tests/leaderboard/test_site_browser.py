@@ -162,13 +162,12 @@ def test_views_show_levels_categories_and_tasks(page: Page) -> None:
     assert page.run(heads) == ["rank", "all", "L1", "L2", "L3", "L4", "L5", "size"]
     choose(page, "view", "show", "categories")
     choose(page, "view", "metric", "onta")
-    assert page.run(heads) == ["rank", "GAC", "SDE", "CPI", "RRR", "CVR", "size"]
+    assert page.run(heads) == ["GAC", "SDE", "CPI", "RRR", "CVR", "size"], "no ranks"
     choose(page, "view", "show", "tasks")
     choose(page, "view", "metric", "ps")
-    assert {row[0] for row in page.run(CELLS)} == {"–"}, "progress is not tested"
     choose(page, "view", "of", "OFE")
     choose(page, "view", "level", "5")
-    assert page.run(heads)[:3] == ["rank", "OFE", "Put Bottles Dustbin"]
+    assert page.run(heads)[:2] == ["OFE", "Put Bottles Dustbin"], "progress is not tested"
 
 
 def test_ranks_are_for_cells_in_which_a_lie_would_have_shown(page: Page) -> None:
@@ -177,8 +176,21 @@ def test_ranks_are_for_cells_in_which_a_lie_would_have_shown(page: Page) -> None
         choose(page, "view", "metric", metric)
         page.click(f"#board th[data-name={name}] button")
         ranks = {row[1]: row[0] for row in page.run(CELLS)}
-        assert ranks["Partly"].isdigit() == rank, (metric, name)
-        assert ranks["Model 0"].isdigit() == (metric == "sr1")
+        assert ranks.get("Partly", "").isdigit() == rank, (metric, name)
+        assert ("Model 0" in ranks) == (metric == "sr1"), "by SR there is no column of ranks"
+
+
+def test_a_model_of_one_task_shows_it_and_nothing_is_cut(page: Page, pair: Path) -> None:
+    page.open(pair)
+    row = "document.querySelector('#board tbody tr:not(.group)').innerText"
+    assert "Pick Blocks Size SR@1 75.0, SR 75.0" in page.run(row)
+    assert "rank" not in page.run("document.querySelector('#board thead').innerText")
+    assert "not ranked: π0.5 (overall 34.6" in page.run(
+        "document.getElementById('board').innerText"
+    )
+    page.look(1280)
+    wide = "[...document.querySelectorAll('.scroll')].map(e => e.scrollWidth - e.clientWidth)"
+    assert max(page.run(wide)) == 0
 
 
 def test_two_models_side_by_side(page: Page) -> None:

@@ -64,9 +64,8 @@ function columnsOf() {
     at("ONTA@1", "onta1", "spatial", 0, "beyond guessing, spatial"), at("PS", "ps", "procedural", 0, "progress, procedural"),
     ...LEVELS.map((n) => at("L" + n, "sr1", "overall", n, "SR@1, overall"))];
 }
-const ABOUT = [["badge", (m) => data.badges[m.badge], (m) => -Object.keys(data.badges).indexOf(m.badge)], ["embodiment", (m) => m.embodiment],
-  ["scenes", (m) => m.mode], ["training", (m) => data.training[m.training]], ["size", (m) => m.parameters, (m) => m.count]]
-  .filter(([name, text]) => !["embodiment", "scenes"].includes(name) || new Set(data.models.map(text)).size > 1);
+const ABOUT = [["badge", (m) => data.badges[m.badge], (m) => -Object.keys(data.badges).indexOf(m.badge)],
+  ["size", (m) => m.parameters, (m) => m.count]];
 
 // The table: a part for every group, with ranks of its own.
 const GROUPS = [...data.groups, { key: "", title: "Embodiment, scenes, instructions or suite not stated", note: "No ranks." }];
@@ -100,13 +99,29 @@ function sortBy(name, down) {
   order = { name, down: order.name === name ? !order.down : down };
   draw(name);
 }
+// Who has the highest values of a group, by more than chance explains where ranks say so.
+function leaders(own) {
+  const led = new Map();
+  let ranked = false;
+  for (const row of ["overall", "spatial", "procedural", ...categories]) {
+    const column = { metric: "sr1", row, level: 0 };
+    const known = own.filter((m) => shownValue(m, column)).sort((a, b) => shownValue(b, column)[0] - shownValue(a, column)[0]);
+    const best = [...ranks(own, column)].filter(([, place]) => place.best).map(([m]) => m);
+    ranked ||= best.length > 0;
+    for (const m of best.length ? best : known.slice(0, 1)) led.set(m.name, [...led.get(m.name) ?? [], `${row} ${percent(shownValue(m, column)[0])}`]);
+  }
+  const texts = [...led].map(([name, rows]) => `${name} (${rows.join(", ")})`);
+  return own.length > 1 && texts.length ? [make("div", {}, (ranked ? "Leading by more than chance: " : "Highest, not ranked: ") + texts.join(", "))] : [];
+}
 function draw(focus) {
+  const present = chosen();
+  columns = columnsOf().filter((c, n) => !n || present.some((m) => shownValue(m, c)));
   const by = columns.find((c) => c.label === order.name) || columns[0];
-  const models = sorted(chosen(), by);
+  const models = sorted(present, by);
   const places = columns.map((c) => ranks(models, c));
   const main = places[columns.indexOf(by)];
   const intervals = view.elements.intervals.checked;
-  head.replaceChildren(make("th", { scope: "col", className: "num", title: "by " + by.label }, "rank"));
+  head.replaceChildren(...main.size ? [make("th", { scope: "col", className: "num", title: "by " + by.label }, "rank")] : []);
   heading(head, "model", "name", "", () => sortBy("model", false));
   for (const c of columns) heading(head, c.label, "num", c.title, () => sortBy(c.label, true));
   for (const [name] of ABOUT) heading(head, name, name === "size" ? "num" : "", "", () => sortBy(name, false));
@@ -115,10 +130,13 @@ function draw(focus) {
     if (focus && cell.dataset.name === focus) cell.querySelector("button").focus({ preventScroll: true });
   }
   const line = (m) => {
-    const row = make("tr", {}, make("td", { className: "num rank" }, String(main.get(m)?.rank ?? (["published", "run", "reproduced"].includes(m.badge) ? "–" : "claim"))));
+    const row = make("tr");
+    if (main.size) row.append(make("td", { className: "num rank" }, String(main.get(m)?.rank ?? (["published", "reproduced"].includes(m.badge) ? "–" : "claim"))));
     const link = make("a", { href: `models/${m.id}/index.html` }, m.name);
-    row.append(make("th", { className: "name", scope: "row" }, link, make("small", {}, m.team), ...categoriesRun(m)));
-    columns.forEach((c, n) => {
+    const more = [m.team, data.training[m.training]].filter(Boolean).join(" · ");
+    row.append(make("th", { className: "name", scope: "row" }, link, make("small", {}, more)));
+    if (!columns.some((c) => shownValue(m, c))) row.append(make("td", { className: "some", colSpan: columns.length }, partsRun(m)));
+    else columns.forEach((c, n) => {
       const v = shownValue(m, c);
       const other = official(m, c);
       const place = places[n].get(m);
@@ -138,17 +156,19 @@ function draw(focus) {
   for (const [group, own] of shown) {
     const text = make("th", { className: "group", colSpan: head.children.length, scope: "rowgroup" }, make("span", {}, group.title));
     if (group.note) text.append(make("small", {}, group.note));
+    text.append(...leaders(own));
     board.append(make("tbody", {}, make("tr", { className: "group" }, text), ...own.map(line)));
   }
   document.getElementById("shown").textContent = models.length
-    ? `${models.length} of ${data.models.length} models, ranked by ${by.title ? by.label + " (" + by.title + ")" : by.label}` +
+    ? `${models.length} of ${data.models.length} models, ${main.size ? "ranked" : "sorted"} by ${by.title ? by.label + " (" + by.title + ")" : by.label}` +
       (shown.length > 1 ? ", each group for itself" : "") : "no model matches";
 }
-// Success in the categories of a model that did not run all of them, and so has no average.
-function categoriesRun(m) {
-  const at = (row) => ["sr1", "sr"].map((metric) => value(m, { metric, row, level: 0 })).map((v) => v ? percent(v[0]) : "–");
-  const run = at("overall")[1] === "–" ? categories.filter((c) => at(c)[1] !== "–") : [];
-  return run.length ? [make("small", {}, run.map((c) => `${c} SR@1 ${at(c)[0]} %, SR ${at(c)[1]} %`).join("; "))] : [];
+// What a model has values of that none of the columns shows: categories, else tasks.
+function partsRun(m) {
+  const at = (metric, row) => value(m, { metric, row, level: 0 });
+  const run = ["category", "task"].map((kind) => ROWS.filter((r) => data.rows[r].kind === kind && at("sr", r))).find((rows) => rows.length) ?? [];
+  return run.map((r) => `${data.rows[r].kind === "task" ? rowName(r) : r} ${["sr1", "sr"].filter((metric) => at(metric, r))
+    .map((metric) => `${data.metrics[metric]} ${percent(at(metric, r)[0])}`).join(", ")}`).join("; ") || "–";
 }
 function change() {
   columns = columnsOf();
