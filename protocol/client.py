@@ -21,13 +21,18 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING, Protocol, TypeVar, cast
 
-import numpy as np
-from numpy.typing import NDArray
-
 from robospa.observation import Observation
 from robospa.protocol import errors, messages
+from robospa.protocol.calls import check_calls
 from robospa.protocol.codec import DEFAULT_LIMITS, Limits, encode_images
-from robospa.protocol.policy import PolicySpec, TrialInfo, check_chunk, check_size
+from robospa.protocol.policy import (
+    SKILL,
+    PolicyAnswer,
+    PolicySpec,
+    TrialInfo,
+    check_chunk,
+    check_size,
+)
 from robospa.protocol.transport import Address, Timeouts, Transport
 
 if TYPE_CHECKING:
@@ -215,8 +220,9 @@ class RemotePolicy:
         self._task = trial.task
         self._when_free(lambda: self._session.reset(self._id(), trial), self.timeouts.reset)
 
-    def infer(self, observation: Observation) -> NDArray[np.float32]:
-        """The action chunk, float32 (T, D), finite, T >= 1 and at most a declared horizon."""
+    def infer(self, observation: Observation) -> PolicyAnswer:
+        """The action chunk, float32 (T, D), finite, T >= 1 and at most a declared horizon; calls of
+        a policy of the space "skill"."""
         if self.spec.image_codec == "jpeg":
             # what is sent has bytes for images; nothing else looks at them
             observation = cast("Observation", encode_images(observation))
@@ -232,6 +238,8 @@ class RemotePolicy:
         round_trip = (time.perf_counter() - start) * 1e3
         self.last_timing = {**_finite(timing), "round_trip_ms": round_trip}
         self._warm = True
+        if self.spec.action == SKILL:
+            return check_calls(answer, self.spec)
         options = self.hello.get("options")
         names = options if isinstance(options, Mapping) else ()
         return check_chunk(answer, self.spec, names, exact=True)
@@ -323,7 +331,11 @@ class _RobospaClient:
     def infer(
         self, id: int, observation: Observation, timeout: float
     ) -> tuple[object, Mapping[str, float]]:
-        actions = self._call(messages.Infer(id, observation), messages.Actions, timeout)
+        request = messages.Infer(id, observation)
+        if self.spec.action == SKILL:
+            said = self._call(request, messages.Calls, timeout)
+            return said.calls, said.timing
+        actions = self._call(request, messages.Actions, timeout)
         return actions.chunk, actions.timing
 
     def end(self, id: int, outcome: Mapping[str, object]) -> None:

@@ -16,7 +16,6 @@ from dataclasses import dataclass, field, replace
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace
 from robospa.observation import WIDTH, Observation
@@ -26,6 +25,7 @@ from robospa.protocol.errors import TransportError, WireError
 from robospa.protocol.messages import (
     VERSION,
     Actions,
+    Calls,
     Error,
     Hello,
     Infer,
@@ -35,7 +35,14 @@ from robospa.protocol.messages import (
     pack,
     unpack,
 )
-from robospa.protocol.policy import PolicySpec, TrialInfo, joints_of, robot_of
+from robospa.protocol.policy import (
+    SKILL,
+    PolicyAnswer,
+    PolicySpec,
+    TrialInfo,
+    joints_of,
+    robot_of,
+)
 from robospa.protocol.transport import Address, Timeouts, Transport
 from robospa.trial import REFERENCE, TrialKey
 
@@ -73,6 +80,8 @@ def synthetic_observation(spec: PolicySpec, step: int = 0, seed: int = 0) -> Obs
     observation["instruction"], observation["step"] = TRIAL.instruction, step
     if spec.history:
         observation["history"] = {offset: view() for offset in spec.history}
+    if spec.action == SKILL:
+        observation["calls"] = []
     if spec.privileged:
         observation["privileged"] = {}
     if spec.environment_state:
@@ -199,6 +208,8 @@ def _spec(target: _Target) -> str:
             f"the dialect {target.dialect} has no spec: the one chosen at this side is used"
         )
     cameras = ", ".join(f"{c.name} {c.width}x{c.height}" for c in spec.cameras) or "none"
+    if spec.action == SKILL:
+        return f"{spec.name}: calls of skills, cameras {cameras}"
     length = "any length" if spec.horizon is None else f"at most {spec.horizon}"
     return f"{spec.name}: {spec.action} actions, chunks of {length}, cameras {cameras}"
 
@@ -233,6 +244,8 @@ def _infer(target: _Target) -> str:
         chunk = policy.infer(synthetic_observation(target.spec))
         policy.infer(synthetic_observation(target.spec, step=len(chunk)))
         policy.end({"success": False, "end": "step_limit"})
+    if isinstance(chunk, list):
+        return f"{len(chunk)} calls, the first one {chunk[0]['skill']}"
     return f"float32 {chunk.shape}, finite, numbers from {chunk.min():.3g} to {chunk.max():.3g}"
 
 
@@ -272,7 +285,7 @@ def _bad_observation(target: _Target) -> str:
         if target.spec.privileged:
             return "refused, and the next reset works"
         answer = _ask(transport, Infer(4, synthetic_observation(target.spec)), target.timeouts)
-        assert isinstance(answer, Actions), f"infer after the error gave {answer.type}"
+        assert isinstance(answer, Actions | Calls), f"infer after the error gave {answer.type}"
         return "refused, and the next trial gets its own answers"
 
 
@@ -307,7 +320,7 @@ def _determinism(target: _Target) -> str:
         with target.connect() as policy:
             policy.reset(trial_for(target.spec))
             chunks.append([policy.infer(synthetic_observation(target.spec)) for _ in range(2)])
-    same = all(np.array_equal(a, b) for a, b in zip(*chunks, strict=True))
+    same = all(_off(a, b) == 0 for a, b in zip(*chunks, strict=True))
     assert same, "the same policy seed and observations gave other actions"
     return "the same policy seed and observations give the same actions"
 
@@ -329,18 +342,27 @@ def _concurrent(target: _Target) -> str:
     if not target.spec.seeded:
         return text
     pairs = list(zip(alone, together, strict=True))
-    assert all(a.shape == b.shape for a, b in pairs), "concurrent chunks have other lengths"
-    off = max(float(np.abs(a - b).max()) for a, b in pairs)
+    off = max(_off(a, b) for a, b in pairs)
+    assert off < np.inf, "concurrent chunks have other lengths"
     assert off <= CLOSE, f"concurrent actions are {off:.3g} off: are sessions mixed up?"
     same = "the same to the bit" if off == 0 else f"the same but for {off:.1g}"
     return f"{text}; {same} as alone"
 
 
-def _episode(policy: RemotePolicy, spec: PolicySpec, number: int) -> NDArray[np.float32]:
-    """The chunks of a short trial of its own."""
+def _off(a: PolicyAnswer, b: PolicyAnswer) -> float:
+    """How far two answers are off; infinite for chunks of other lengths and for other calls."""
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray) and a.shape == b.shape:
+        return float(np.abs(a - b).max())
+    return 0.0 if isinstance(a, list) and a == b else np.inf
+
+
+def _episode(policy: RemotePolicy, spec: PolicySpec, number: int) -> PolicyAnswer:
+    """The answers of a short trial of its own, one after the other."""
     policy.reset(replace(trial_for(spec), id=f"trial-{number}", policy_seed=number))
     seen = [synthetic_observation(spec, step, seed=10 * number + step) for step in range(3)]
-    return np.concatenate([policy.infer(one) for one in seen])
+    answers = [policy.infer(one) for one in seen]
+    calls = [call for answer in answers if isinstance(answer, list) for call in answer]
+    return calls or np.concatenate([one for one in answers if isinstance(one, np.ndarray)])
 
 
 def _real_time_chunking(target: _Target) -> str:
@@ -350,6 +372,8 @@ def _real_time_chunking(target: _Target) -> str:
     with target.connect() as policy:
         policy.reset(trial_for(spec))
         first = policy.infer(synthetic_observation(spec))
+        if isinstance(first, list):
+            raise _Skip("it answers calls of skills")
         sent = {**synthetic_observation(spec, step=1), "committed": first[1:], "delay": 1}
         policy.infer(cast(Observation, sent))
         sent = {**synthetic_observation(spec, step=2), "committed": first[:0], "delay": 0}

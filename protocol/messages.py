@@ -3,7 +3,7 @@
     client                     server
                                hello    once, right after the handshake (id 0)
     reset   trial          ->  ready    or error
-    infer   observation    ->  actions  or error
+    infer   observation    ->  actions  or error; `calls` of a policy of the space "skill"
     end     outcome        ->  ended    or error
 
 Every request carries an id that its one answer repeats. Unknown fields are ignored (later minor
@@ -92,6 +92,16 @@ class Actions:
     timing: Mapping[str, int | float] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, eq=False)
+class Calls:
+    """Answer to infer of a policy of the action space "skill": maps (`robospa.protocol.calls`)."""
+
+    type: ClassVar[str] = "calls"
+    id: RequestId
+    calls: list[object]
+    timing: Mapping[str, int | float] = field(default_factory=dict)
+
+
 @dataclass(frozen=True)
 class Error:
     """Answer to any request that failed. `message` is one sentence; `retriable`: the same trial
@@ -137,9 +147,9 @@ class _Step:
     step: Whole
 
 
-Message = Hello | Reset | Ready | Infer | Actions | Error | End | Ended
+Message = Hello | Reset | Ready | Infer | Actions | Calls | Error | End | Ended
 TYPES: dict[str, type[Message]] = {
-    kind.type: kind for kind in (Hello, Reset, Ready, Infer, Actions, Error, End, Ended)
+    kind.type: kind for kind in (Hello, Reset, Ready, Infer, Actions, Calls, Error, End, Ended)
 }
 
 

@@ -24,6 +24,10 @@ from robospa.schema import Identifier, SettingName, describe, one_of, read
 from robospa.trial import REFERENCE, TrialKey
 
 CODECS = ("raw", "jpeg")
+SKILL = "skill"
+"""The space of policies that answer calls of skills (`robospa.protocol.calls`), not chunks."""
+PolicyAnswer = NDArray[np.float32] | list[dict[str, object]]
+"""A chunk of actions, float32 (T, D), or calls of skills."""
 JOINT_DIMS = tuple(
     ActionSpace("joint", joints).width for joints in (SIX_JOINT_ARMS, (6, 7), SEVEN_JOINT_ARMS)
 )
@@ -51,9 +55,9 @@ class PolicySpec:
     """The images that are rendered and sent; head and both wrists at 320x240 by default."""
     state: Annotated[str, one_of(STATES)] = "commanded"
     """Joints as `commanded` (the official convention), as `measured`, or `none`."""
-    action: Annotated[str, one_of(KINDS)] = "joint"
+    action: Annotated[str, one_of((*KINDS, SKILL))] = "joint"
     """Space of the actions: `joint` (absolute targets, laid out as the observation's `state`), `ee`
-    (per arm x y z [m], qw qx qy qz, gripper) or `delta_ee`."""
+    (per arm x y z [m], qw qx qy qz, gripper), `delta_ee`, or `skill`: calls of skills."""
     horizon: Annotated[int, Meta(ge=1, le=MAX_HORIZON)] | None = None
     """The most actions that a chunk may hold; None if it is not declared: up to 10,000."""
     execute: Annotated[int, Meta(ge=1)] | None = None
@@ -103,6 +107,11 @@ class PolicySpec:
     def sees_state(self) -> bool:
         """Whether it is told of the objects what others have to see in images."""
         return self.privileged or self.environment_state
+
+    @property
+    def executed(self) -> str:
+        """Space of the actions that are executed and recorded: skills move joints."""
+        return "joint" if self.action == SKILL else self.action
 
     @property
     def action_dims(self) -> tuple[int, ...]:
@@ -201,9 +210,9 @@ class Policy(Protocol):
     def reset(self, trial: TrialInfo) -> None:
         """A trial begins: forget the one before."""
 
-    def infer(self, observation: Observation) -> NDArray[np.float32]:
+    def infer(self, observation: Observation) -> PolicyAnswer:
         """The next actions: float32 (T, D), all numbers finite, at least one row and at most
-        `spec.horizon` where that is declared."""
+        `spec.horizon` where that is declared; of the space `skill` a list of calls."""
 
 
 class OptionalMembers(Policy, Protocol):
@@ -215,7 +224,7 @@ class OptionalMembers(Policy, Protocol):
 
     def infer_batch(
         self, observations: Sequence[Observation], sessions: Sequence[int]
-    ) -> Sequence[NDArray[np.float32]]:
+    ) -> Sequence[PolicyAnswer]:
         """Several observations in one call of the model."""
 
     def reset_session(self, session: int, trial: TrialInfo) -> None:
@@ -336,6 +345,11 @@ def check_observation(observation: Mapping[str, object], spec: PolicySpec) -> Ob
         objects = observation.get("environment_state")
         if not isinstance(objects, np.ndarray) or objects.ndim != 1 or objects.dtype != np.float32:
             raise DecodeError("observation: 'environment_state' must be float32 of one axis")
+    calls = observation.get("calls")
+    if spec.action == SKILL and not (
+        isinstance(calls, list) and all(isinstance(call, dict) for call in calls)
+    ):
+        raise DecodeError("observation: 'calls' must be a list of maps")
     if spec.committed_actions and "committed" in observation:
         rows, delay = observation["committed"], observation.get("delay")
         if not isinstance(rows, np.ndarray) or rows.ndim != 2 or rows.dtype != np.float32:

@@ -32,6 +32,7 @@ from websockets.typing import Subprotocol
 
 from robospa.protocol import messages
 from robospa.protocol.batching import QueueFull
+from robospa.protocol.calls import check_calls
 from robospa.protocol.codec import Limits, decode, decode_images
 from robospa.protocol.connection_limits import (
     ConnectionLimiter,
@@ -48,7 +49,7 @@ from robospa.protocol.errors import (
 )
 from robospa.protocol.messages import SUBPROTOCOL, Error, Message
 from robospa.protocol.openpi import serve_openpi
-from robospa.protocol.policy import Policy, PolicySpec, check_chunk, check_observation
+from robospa.protocol.policy import SKILL, Policy, PolicySpec, check_chunk, check_observation
 from robospa.protocol.policy_host import PolicyFactory, PolicyHost, PolicySession
 from robospa.protocol.transport import enlarge_buffers, keep_alive, keep_freed_memory
 
@@ -138,6 +139,8 @@ class ConnectionHandler:
             return Error(request.id, messages.BAD_OBSERVATION, str(error))
         try:
             answer, timing = await self.policy.infer(observation)
+            if self.spec.action == SKILL:
+                return messages.Calls(request.id, [*check_calls(answer, self.spec)], timing)
             return messages.Actions(request.id, check_chunk(answer, self.spec), timing)
         except PolicyAnswerError as error:
             used = self.policy.usage

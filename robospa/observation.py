@@ -72,6 +72,9 @@ class Observation(View, total=False):
     delay: int
     """Goes with `committed`: how many of these will be executed before the answer takes over, as
     far as can be foretold."""
+    calls: list[dict[str, object]]
+    """In the action space `skill`: all calls so far with their `feedback`, "done" or a sentence
+    that says why not."""
     environment_state: NDArray[np.float32]
     """(E,): the objects as numbers, for `PolicySpec.environment_state`; what each of them is says
     `robospa.observation.NAMES`."""

@@ -66,8 +66,7 @@ class Request:
 
     `settings` are what all of this was made from, saved with the run to be used again;
     `arguments`, and where the `seeds` come from, are only kept in the manifest. `wait`: how long
-    the policy's server may take to come up at the start [s]. `look`: whether the first actions of
-    a policy are looked at before its trials.
+    the policy's server may take to come up at the start [s].
     """
 
     config: WorkerConfig
@@ -82,7 +81,6 @@ class Request:
     """Where the workers are."""
     in_process: bool = False
     """The policy's server is one of this process, which ends with the run."""
-    look: bool = False
 
 
 class WorldBroken(Exception):
@@ -222,8 +220,7 @@ def evaluate(request: Request) -> None:
     """
     folder = request.config.folder
     check_folder(folder, request.resume)
-    look = request.look and not request.resume
-    policies = probe_policies(request.config, request.keys, request.wait, look)
+    policies = probe_policies(request.config, request.keys, request.wait)
     if request.config.salt:
         check_blind(policies.values())
     check_clock(request.config.clock, [policy.spec for policy in policies.values()])

@@ -18,9 +18,6 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from robospa.harness.factory import is_url
 from robospa.harness.running.executor import Activity, Heartbeat
 from robospa.observation import Observation
@@ -31,7 +28,7 @@ from robospa.protocol.errors import (
     error_sentence,
     policy_traceback,
 )
-from robospa.protocol.policy import Policy, PolicySpec, TrialInfo, has
+from robospa.protocol.policy import Policy, PolicyAnswer, PolicySpec, TrialInfo, has
 
 HEARTBEAT_SECONDS = 1.0
 
@@ -160,7 +157,7 @@ class MonitoredPolicy:
             with self._own_errors():
                 self._policy.reset(trial)
 
-    def infer(self, observation: Observation) -> NDArray[np.float32]:
+    def infer(self, observation: Observation) -> PolicyAnswer:
         """The policy's answer, not yet checked."""
         with self._heartbeat.policy(self.target), self._own_errors():
             answer = self._policy.infer(observation)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +17,7 @@ from robospa.harness.clock.policy_clock import PolicyClock
 from robospa.harness.factory import is_url, open_policy
 from robospa.harness.robots import embodiment
 from robospa.protocol.client import Identity, identity_of
-from robospa.protocol.policy import PolicySpec, has
+from robospa.protocol.policy import SKILL, PolicySpec, has
 from robospa.results.records.manifest import PolicySettings, RunError
 from robospa.schema import parse_json
 from robospa.text import some
@@ -44,8 +43,6 @@ class ProbedPolicy:
     replicas: tuple[ProbedPolicy, ...] = ()
     volatile: frozenset[str] = frozenset()
     """Names in its greeting that changed from one connection to the next."""
-    hints: tuple[str, ...] = ()
-    """What its first actions look as if they got wrong, a sentence each."""
 
     @property
     def identity(self) -> Identity:
@@ -89,11 +86,8 @@ def _is_targets(value: object) -> bool:
     return all(v and isinstance(v, str) for v in value) and len(set(value)) == len(value) > 0
 
 
-def probe(
-    target: str, given: Mapping[str, Any], wait: float = 0.0, look: bool = False
-) -> ProbedPolicy:
-    """The policy at `target`, after at most `wait` s of nobody listening; `look`: at its first
-    actions, too. One that does not answer says so in its trials.
+def probe(target: str, given: Mapping[str, Any], wait: float = 0.0) -> ProbedPolicy:
+    """The policy at `target`, after at most `wait` s of nobody listening.
 
     Raises what connecting raises.
     """
@@ -102,21 +96,15 @@ def probe(
         options["timeouts"] = replace(options["timeouts"], wait=wait)
     policy = open_policy(target, options)
     hello = dict(policy.hello) if has(policy, "hello") else {"dialect": "in process"}
-    hints: list[str] = []
-    if look:
-        from robospa.harness.convention_check import initial_actions
-
-        with suppress(Exception):
-            hints, _ = initial_actions.hints(policy)
     if has(policy, "close"):
         policy.close()
-    return ProbedPolicy(target, policy.spec, hello, hints=tuple(hints))
+    return ProbedPolicy(target, policy.spec, hello)
 
 
 def probe_policies(
-    config: WorkerConfig, keys: Sequence[TrialKey], wait: float = 0.0, look: bool = False
+    config: WorkerConfig, keys: Sequence[TrialKey], wait: float = 0.0
 ) -> dict[str, ProbedPolicy]:
-    """The policy of every task of `keys`, each server asked once; `look`: at first actions, too.
+    """The policy of every task of `keys`, each server asked once.
 
     Raises what connecting raises, and RunError if one does not drive the embodiment asked for or
     if those of one task differ.
@@ -124,7 +112,7 @@ def probe_policies(
     tasks = list(dict.fromkeys(key.task for key in keys))
     targets = dict.fromkeys(target for task in tasks for target in config.targets(task))
     seen = without_volatile(
-        {target: probe(target, config.options, wait, look) for target in targets}, config.options
+        {target: probe(target, config.options, wait) for target in targets}, config.options
     )
     found: dict[str, ProbedPolicy] = {}
     for task in tasks:
@@ -191,7 +179,7 @@ def check_fit(policy: ProbedPolicy, keys: Sequence[TrialKey]) -> None:
                 f"the policy {spec.name!r} drives {', '.join(spec.embodiments)}, not {robot}; "
                 f"choose another --embodiment{option}"
             )
-        space = embodiment(robot).action_space(spec.action)
+        space = embodiment(robot).action_space(spec.executed)
         if spec.action_dim not in (None, space.width):
             raise RunError(
                 f"the policy {spec.name!r} answers {spec.action_dim} numbers per action, but a "
@@ -219,6 +207,11 @@ def check_blind(policies: Iterable[ProbedPolicy]) -> None:
 def check_clock(clock: PolicyClock | None, specs: Iterable[PolicySpec]) -> None:
     """Raises RunError if a policy's chunks cannot follow each other as `clock` says."""
     for spec in specs:
+        if clock is not None and spec.action == SKILL:
+            raise RunError(
+                f"the policy {spec.name!r} answers calls of skills, which take as long as they "
+                "take: leave out --clock"
+            )
         if clock is not None and clock.switching.kind == "ensemble" and spec.action != "joint":
             raise RunError(
                 f"the policy {spec.name!r} answers {spec.action} actions, whose mean is no pose: "
@@ -261,7 +254,6 @@ def warnings_of(
                     "sure that both serve the same checkpoint"
                 )
         found += [str(text) for text in policy.hello.get("warnings", ())]
-        found += [f"{p.target}: {text}" for p in (policy, *policy.replicas) for text in p.hints]
         if (budget := policy.spec.text_budget) is not None:
             budgets.setdefault(budget, {})[task] = instructions.get(task, "")
     if budgets:

@@ -176,7 +176,7 @@ class Worker:
             video=film_name(key) if self.config.films(key, record.success) else "",
         )
         self.writer.check()
-        space = policy.spec.action
+        space = policy.spec.executed
         write_actions(self.config.folder, key, recorder.actions, space, recorder.joints)
         self.writer.write(record)
         try:

@@ -26,7 +26,6 @@ from robospa.results.scoring.scores import (
     level_name,
     score_run,
 )
-from robospa.results.scoring.usage import usage_table
 from robospa.results.statistics.intervals import Estimate
 from robospa.results.tables import (
     MISSING,
@@ -127,7 +126,7 @@ def _level_cell(part: VariantScore | AverageScore | None) -> TableCell:
     return TableCell(short(part.values.get("sr")), sign=MISSING * bool(part.missing))
 
 
-BESIDE = (grounding_table, comparable_table, usage_table)
+BESIDE = (grounding_table, comparable_table)
 """Tables that a report has beside the paper's."""
 
 

@@ -1,4 +1,0 @@
-#version 450
-// No shadows: what a pixel shows does not depend on them.
-
-#include "../shadow.glsl"
