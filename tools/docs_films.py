@@ -1,8 +1,8 @@
-"""The animated pictures of the documentation: the expert at three tasks, and with each robot.
+"""The pictures of the documentation that show more than one task: films of the expert, and sheets.
 
-`python tools/docs_films.py FOLDER` writes FOLDER/trials.webp, each task with its sentence below,
-and FOLDER/ROBOT.webp for the robots of the paper. Pages show WebP without a player. Needs a device
-that draws.
+`python tools/docs_films.py FOLDER` writes FOLDER/trials.webp, three tasks with their sentences
+below, FOLDER/ROBOT.webp for the robots of the paper, robots.jpg, which has them side by side, and
+randomized.jpg. Pages show WebP without a player. Needs a device that draws.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.harness.demonstrations.demonstration import demonstrate
+from robospa.harness.pictures.gallery import first_frame
 from robospa.harness.pictures.video import FPS, FilmRecorder
 from robospa.harness.world import World
 from robospa.tasks.catalog import build_scene
@@ -51,6 +52,16 @@ QUALITY = (85, 70, 55, 40, 25)
 """Of WebP: the best of these that is small enough."""
 MOST_BYTES, ROBOT_BYTES = 1_500_000, 900_000
 DARK, LIGHT = (24, 28, 34), (236, 239, 243)
+RANDOMIZED = (
+    "Pick_Blocks_Size,Pick_Blocks_Area,Pick_Pill_Bottles_Distance,Pick_Blocks_Canonical,"
+    "Pick_Mixed_Objects_Canonical_A,Pick_Cans_Relational,Pick_Mixed_Objects_Relational_B,"
+    "Pick_Breads_Multi_View,Press_Stapler_Repeat,Click_Bell_Repeat,Move_Playing_Cards_Away,"
+    "Rank_Blocks_Height,Hit_Blocks_Hammer_Order,Click_Bell_Clockwise_Order,"
+    "Stack_Blocks_Length_Order,Hang_Mug_Stack_Blocks,Click_Can_Place_Items,"
+    "Observe_Blocks_Move_Memory,Remember_Orientation_Restore,Pick_Mugs_Distance"
+)
+SHEET, LABEL, APART = (320, 240), 22, 6
+"""Width and height of a picture on a sheet, height of its label and the gap beside it [px]."""
 
 
 class Animation(FilmRecorder):
@@ -108,13 +119,39 @@ def tasks_film(world: World) -> bytes:
     return encode(frames, MOST_BYTES)
 
 
-def robot_film(world: World, robot: str) -> bytes:
+def robot_frames(world: World, robot: str) -> list[Image.Image]:
     """The expert with `robot` in the first scene that it solves; RuntimeError for none."""
     for seed in range(SEED, SEED + TRIES):
         recorder = Animation(lambda image: image.crop(ROBOT_CUT).resize(ROBOT_SIZE))
         if demonstrate(world, TrialKey(*ROBOTS_TASK, seed, robot), recorder).success:
-            return encode(recorder.frames, ROBOT_BYTES)
+            return recorder.frames
     raise RuntimeError(f"{robot} solves none of {TRIES} scenes")
+
+
+def tiled(cells: list[tuple[str, Image.Image]], across: int) -> Image.Image:
+    """Labelled pictures on one sheet, `across` of them in a row."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    wide, high = SHEET[0] + APART, SHEET[1] + LABEL + APART
+    made = Image.new("RGB", (across * wide, -(-len(cells) // across) * high), "white")
+    draw, font = ImageDraw.Draw(made), ImageFont.load_default(TEXT)
+    for number, (label, picture) in enumerate(cells):
+        x, y = number % across * wide, number // across * high
+        draw.text((x + 2, y + 2), label, font=font, fill=DARK)
+        made.paste(picture.resize(SHEET, Image.Resampling.LANCZOS), (x, y + LABEL))
+    return made
+
+
+def randomized_sheet(world: World) -> Image.Image:
+    """Twenty randomised scenes as the head camera sees them."""
+    from PIL import Image
+
+    cells = []
+    for task in RANDOMIZED.split(","):
+        scene = build_scene(task, 4, SEED, mode="randomized")
+        picture = Image.fromarray(first_frame(world, scene))
+        cells.append((task.replace("_", " "), picture))
+    return tiled(cells, 5)
 
 
 def main(folder: Path) -> None:
@@ -124,8 +161,13 @@ def main(folder: Path) -> None:
 
     world = SapienWorld(render=True, limits=DEMONSTRATION_LIMITS)
     (folder / "trials.webp").write_bytes(tasks_film(world))
-    for robot in ROBOTS:
-        (folder / f"{robot}.webp").write_bytes(robot_film(world, robot))
+    films = {robot: robot_frames(world, robot) for robot in ROBOTS}
+    for robot, frames in films.items():
+        (folder / f"{robot}.webp").write_bytes(encode(frames, ROBOT_BYTES))
+    stills = [(robot, frames[0]) for robot, frames in films.items()]
+    stills += [("", frames[len(frames) // 5]) for frames in films.values()]
+    tiled(stills, len(ROBOTS)).save(folder / "robots.jpg", quality=88)
+    randomized_sheet(SapienWorld(render=True)).save(folder / "randomized.jpg", quality=88)
 
 
 if __name__ == "__main__":
