@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.protocol.policy import USAGE, Policy, PolicySpec
+from robospa.results.records import trial_record
 
 if TYPE_CHECKING:
     from robospa.harness.trial import TrialState
@@ -121,4 +122,4 @@ class PolicyCaller:
         """What a record keeps of what the trial has used, as its policy says after each answer."""
         last = self.server_timings[-1] if self.server_timings else {}
         found = {name: last[name] for name in USAGE if name in last and 0 <= last[name] < 1e15}
-        return {"usage": found} if found else {}
+        return {trial_record.USAGE: found} if found else {}

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
@@ -12,6 +13,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.geometry import Pose, Vec3, rotate
 from robospa.observation import CameraSpec, Observation
 from robospa.protocol.policy import PolicySpec
 from robospa.results.records.action_problems import ProblemKind
@@ -63,6 +65,42 @@ FROM_MEASURED = ("ee", JOINTS_FROM_EE)
 """Actions that begin where the arms are."""
 
 
+TABLE, OTHER = -1, -2
+"""What a pixel shows besides objects: the table's top; anything else or nothing."""
+
+
+@dataclass(frozen=True)
+class CameraView:
+    """Where a camera is: `pose` in the world (x forward, y left, z up), vertical field of view
+    [rad], near plane [m] and width of the picture over its height.
+
+    A place in the picture is u to the right and v down, from its upper left corner, both 0 to 1.
+    """
+
+    pose: Pose
+    fov: float
+    near: float
+    aspect: float = 4 / 3
+
+    def pixel(self, point: Vec3) -> tuple[float, float] | None:
+        """Where (u, v) a point [m, world] is seen, perhaps outside the picture; None behind it."""
+        x, y, z = self.pose.inverse().apply(point)
+        if x < self.near:
+            return None
+        half = x * math.tan(self.fov / 2)
+        return 0.5 - 0.5 * y / (half * self.aspect), 0.5 - 0.5 * z / half
+
+    def onto(self, u: float, v: float, height: float) -> Vec3 | None:
+        """The point [m, world] seen at (u, v) of the level at `height`, as `Scene.table_top` is;
+        None if the level is not seen there."""
+        half = math.tan(self.fov / 2)
+        way = (1.0, (1 - 2 * u) * half * self.aspect, (1 - 2 * v) * half)
+        x, y, z = rotate(self.pose.rotation, way)
+        at = self.pose.position
+        far = (height - at[2]) / z if z else -1.0
+        return (at[0] + far * x, at[1] + far * y, height) if far > 0 else None
+
+
 class RenderableState(Protocol):
     """What an instant of a world looks like; equal ones have equal images."""
 
@@ -105,6 +143,15 @@ class World(Protocol):
 
     def render(self, camera: CameraSpec) -> NDArray[np.uint8]:
         """One RGB image, uint8 of shape (height, width, 3); raises RenderUnavailable."""
+        ...
+
+    def identify(self, camera: CameraSpec) -> NDArray[np.int16]:
+        """What each pixel of its image shows, (height, width): an index in `scene.everything`, or
+        TABLE or OTHER. Doors and handles are their object's. Raises RenderUnavailable."""
+        ...
+
+    def view(self, camera: CameraSpec) -> CameraView:
+        """Where this camera is at this instant: which points its pixels show."""
         ...
 
     def still(self) -> RenderableState:

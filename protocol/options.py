@@ -126,7 +126,8 @@ def option_table(cls: type[Any]) -> list[OptionRow]:
     for field in dataclasses.fields(cls):
         choices = field.metadata.get("choices", ())
         values = ", ".join(choices) if choices else _type_name(hints[field.name])
-        shown = "none" if field.default is None else str(field.default).lower()
+        plain = field.default is None or isinstance(field.default, bool)
+        shown = str(field.default).lower() if plain else str(field.default)
         rows.append(OptionRow(field.name, shown, values, field.metadata.get("help", "")))
     return rows
 

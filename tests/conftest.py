@@ -29,7 +29,7 @@ LONG = (
     "test_server_faults",
     "test_runner",
     "test_client",
-    "test_heartbeat",
+    "test_held_trials",
     "test_figures",
     "test_ranking",
     "test_report",
@@ -89,6 +89,13 @@ def same_figures_once(monkeypatch: pytest.MonkeyPatch, drawn_figures: Path) -> N
     from kept_figures import keep_figures
 
     keep_figures(monkeypatch, drawn_figures)
+
+
+@pytest.fixture
+def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages without pictures."""
+    for page in ("results.report.report", "leaderboard.site"):
+        monkeypatch.setattr(f"robospa.{page}.draw", lambda *given: [])
 
 
 @pytest.fixture

@@ -38,7 +38,11 @@ def compare(
     ci: Annotated[Method, typer.Option(help="intervals of single rates")] = Method.wilson,
     variants: Annotated[bool, typer.Option(help="list all variants, not only those apart")] = False,
     power: Annotated[
-        bool, typer.Option(help="compare nothing: say how many trials tell rates apart")
+        bool,
+        typer.Option(
+            help="compare nothing: say how many trials tell rates apart, and what they cost if "
+            "they are like those of a run that is named"
+        ),
     ] = False,
     base: Annotated[
         float, typer.Option(callback=SHARE, help="with --power: rate of the first")
@@ -49,7 +53,7 @@ def compare(
 ) -> None:
     """Say what differs between two runs on the same seeds, or between a run and the paper."""
     if power:
-        _power(tasks, levels, base, as_json)
+        _power(tasks, levels, base, first, as_json)
         return
     if not (first and second):
         raise ValueError("compare needs two sides: folders of runs, or names of published models")
@@ -97,7 +101,7 @@ def _table(title: str, rows: Sequence[Difference], found: RunComparison) -> None
         show(difference_table(found, rows, title))
 
 
-def _power(tasks: str, levels: str, base: float, as_json: bool) -> None:
+def _power(tasks: str, levels: str, base: float, run: str, as_json: bool) -> None:
     from robospa.harness.selection import parse_levels, parse_tasks
     from robospa.results.comparison.sample_size import (
         POWER,
@@ -106,16 +110,20 @@ def _power(tasks: str, levels: str, base: float, as_json: bool) -> None:
         sample_size,
         trials_for,
     )
+    from robospa.results.records.runs import read_run
+    from robospa.results.scoring.usage import plan_line
 
     variants = [(task, level) for task in parse_tasks(tasks) for level in parse_levels(levels)]
     models = published_variances(variants)
     widths = {n: {m: half_width(v, n) for m, v in models.items()} for n in TRIALS}
     enough = {half: max(trials_for(v, half) for v in models.values()) for half in HALVES if models}
     gaps = {gap: sample_size(base, gap) for gap in GAPS if base + gap < 1}
+    records = list(read_run(run).records.values()) if run else []
+    costs = [line for n in TRIALS if (line := plan_line(records, n * len(variants)))]
     if as_json:
         apart = [{"gap": gap, **asdict(needed)} for gap, needed in gaps.items()]
         found = {"half_widths": widths, "enough": enough, "differences": apart}
-        print_json({"variants": len(variants), **found})
+        print_json({"variants": len(variants), **found, "costs": costs})
         return
     for n, by_model in widths.items():
         if by_model:
@@ -133,3 +141,4 @@ def _power(tasks: str, levels: str, base: float, as_json: bool) -> None:
         )
     print("SR@1 takes what an SR of its value takes.")
     print("For a mean over k variants divide by k: that many trials a variant.")
+    print(*costs, sep="\n", end="\n" if costs else "")

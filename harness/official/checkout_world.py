@@ -28,7 +28,14 @@ from robospa.harness.official import checkout_server
 from robospa.harness.official.checkout import CONFIGS, CheckoutSnapshot, checkout_parts
 from robospa.harness.official.sentences import UNSEEN, OfficialSentences, read_checkout
 from robospa.harness.robots import embodiment
-from robospa.harness.world import ActionError, Poll, RenderUnavailable, SceneUnstable, StepResult
+from robospa.harness.world import (
+    ActionError,
+    CameraView,
+    Poll,
+    RenderUnavailable,
+    SceneUnstable,
+    StepResult,
+)
 from robospa.observation import DEFAULT_CAMERAS, CameraSpec, Observation
 from robospa.protocol.errors import printable
 from robospa.protocol.policy import PolicySpec
@@ -283,6 +290,14 @@ class CheckoutWorld:
     def render(self, camera: CameraSpec) -> NDArray[np.uint8]:
         """One RGB image (height, width, 3) of this instant."""
         return self.pictures([camera])[camera.name]
+
+    def identify(self, camera: CameraSpec) -> NDArray[np.int16]:
+        """A checkout does not tell what its pixels show: RenderUnavailable."""
+        raise RenderUnavailable("a checkout does not tell which objects its pictures show")
+
+    def view(self, camera: CameraSpec) -> CameraView:
+        """Nor where its cameras are: RenderUnavailable."""
+        raise RenderUnavailable("a checkout does not tell where its cameras are")
 
     def still(self) -> CheckoutStill:
         """This instant, to be drawn before the world goes on."""

@@ -66,7 +66,8 @@ class Request:
 
     `settings` are what all of this was made from, saved with the run to be used again;
     `arguments`, and where the `seeds` come from, are only kept in the manifest. `wait`: how long
-    the policy's server may take to come up at the start [s].
+    the policy's server may take to come up at the start [s]. `look`: whether the first actions of
+    a policy are looked at before its trials.
     """
 
     config: WorkerConfig
@@ -81,6 +82,7 @@ class Request:
     """Where the workers are."""
     in_process: bool = False
     """The policy's server is one of this process, which ends with the run."""
+    look: bool = False
 
 
 class WorldBroken(Exception):
@@ -220,7 +222,8 @@ def evaluate(request: Request) -> None:
     """
     folder = request.config.folder
     check_folder(folder, request.resume)
-    policies = probe_policies(request.config, request.keys, request.wait)
+    look = request.look and not request.resume
+    policies = probe_policies(request.config, request.keys, request.wait, look)
     if request.config.salt:
         check_blind(policies.values())
     check_clock(request.config.clock, [policy.spec for policy in policies.values()])

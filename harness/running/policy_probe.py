@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -43,6 +44,8 @@ class ProbedPolicy:
     replicas: tuple[ProbedPolicy, ...] = ()
     volatile: frozenset[str] = frozenset()
     """Names in its greeting that changed from one connection to the next."""
+    hints: tuple[str, ...] = ()
+    """What its first actions look as if they got wrong, a sentence each."""
 
     @property
     def identity(self) -> Identity:
@@ -86,8 +89,11 @@ def _is_targets(value: object) -> bool:
     return all(v and isinstance(v, str) for v in value) and len(set(value)) == len(value) > 0
 
 
-def probe(target: str, given: Mapping[str, Any], wait: float = 0.0) -> ProbedPolicy:
-    """The policy at `target`, after at most `wait` s of nobody listening.
+def probe(
+    target: str, given: Mapping[str, Any], wait: float = 0.0, look: bool = False
+) -> ProbedPolicy:
+    """The policy at `target`, after at most `wait` s of nobody listening; `look`: at its first
+    actions, too. One that does not answer says so in its trials.
 
     Raises what connecting raises.
     """
@@ -96,15 +102,21 @@ def probe(target: str, given: Mapping[str, Any], wait: float = 0.0) -> ProbedPol
         options["timeouts"] = replace(options["timeouts"], wait=wait)
     policy = open_policy(target, options)
     hello = dict(policy.hello) if has(policy, "hello") else {"dialect": "in process"}
+    hints: list[str] = []
+    if look:
+        from robospa.harness.convention_check import initial_actions
+
+        with suppress(Exception):
+            hints, _ = initial_actions.hints(policy)
     if has(policy, "close"):
         policy.close()
-    return ProbedPolicy(target, policy.spec, hello)
+    return ProbedPolicy(target, policy.spec, hello, hints=tuple(hints))
 
 
 def probe_policies(
-    config: WorkerConfig, keys: Sequence[TrialKey], wait: float = 0.0
+    config: WorkerConfig, keys: Sequence[TrialKey], wait: float = 0.0, look: bool = False
 ) -> dict[str, ProbedPolicy]:
-    """The policy of every task of `keys`, each server asked once.
+    """The policy of every task of `keys`, each server asked once; `look`: at first actions, too.
 
     Raises what connecting raises, and RunError if one does not drive the embodiment asked for or
     if those of one task differ.
@@ -112,7 +124,7 @@ def probe_policies(
     tasks = list(dict.fromkeys(key.task for key in keys))
     targets = dict.fromkeys(target for task in tasks for target in config.targets(task))
     seen = without_volatile(
-        {target: probe(target, config.options, wait) for target in targets}, config.options
+        {target: probe(target, config.options, wait, look) for target in targets}, config.options
     )
     found: dict[str, ProbedPolicy] = {}
     for task in tasks:
@@ -254,6 +266,7 @@ def warnings_of(
                     "sure that both serve the same checkpoint"
                 )
         found += [str(text) for text in policy.hello.get("warnings", ())]
+        found += [f"{p.target}: {text}" for p in (policy, *policy.replicas) for text in p.hints]
         if (budget := policy.spec.text_budget) is not None:
             budgets.setdefault(budget, {})[task] = instructions.get(task, "")
     if budgets:

@@ -25,7 +25,7 @@ from robospa.harness.settings import (
     SettingsError,
     flat,
 )
-from robospa.harness.worlds import WorldKind, world_kind
+from robospa.harness.worlds import SAPIEN_NAME, WorldKind, world_kind
 from robospa.registry import UnknownName
 from robospa.trial import TrialKey
 
@@ -98,6 +98,7 @@ def make_request(
         resume=resume,
         wait=settings.connection.wait,
         compute=compute,
+        look=kind.name == SAPIEN_NAME,  # another world may have conventions of its own
     )
 
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from threading import get_ident
@@ -23,6 +22,7 @@ from numpy.typing import NDArray
 from robospa.geometry import Pose, rotate
 from robospa.harness.sim.antialiasing import Smoother
 from robospa.harness.sim.bodies import to_sapien
+from robospa.harness.world import CameraView
 from robospa.observation import CameraSpec
 
 if TYPE_CHECKING:
@@ -31,6 +31,10 @@ if TYPE_CHECKING:
 SHADER = Path(__file__).parent / "shader"
 """Folder of the shader; its files are compiled when a process makes its first camera."""
 BYTES, FLOATS = "R8G8B8A8Unorm", "R32G32B32A32Sfloat"
+
+
+IDS = SHADER / "ids"
+"""Folder of the shader that draws numbers of bodies in the place of colours."""
 
 
 def new_camera(
@@ -70,6 +74,20 @@ def pixels(
     return images
 
 
+def mark(entity: sapien.Entity, number: int) -> None:
+    """Give what is drawn of a body the number (1 to 65,535) that `IDS` draws."""
+    for component in entity.components:
+        for drawn in component._internal_node.children:
+            drawn.set_segmentation([0, 0, 0, number])
+
+
+def numbers(camera: sapien.render.RenderCameraComponent) -> tuple[NDArray[np.int32], ...]:
+    """Of the picture taken last by a camera of `IDS`: the body's number at each pixel, 0 where it
+    has none, and whether its surface looks up there, (height, width) each."""
+    low, high, up, _ = np.moveaxis(camera.get_picture("Color").astype(np.int32), 2, 0)
+    return low + 256 * high, up
+
+
 @lru_cache(maxsize=8)
 def _smoother(thread: int, height: int, width: int, count: int) -> Smoother:
     return Smoother(height, width, count)
@@ -79,15 +97,6 @@ MOST = 3
 """Pictures side by side; the shader has room for so many."""
 NEAR, FAR = 0.01, 100.0
 """[m], of all pictures: nothing comes nearer to a head camera than to a wrist camera's fingers."""
-
-
-@dataclass(frozen=True)
-class CameraView:
-    """A camera's pose (x forward, z up), vertical field of view [rad] and near plane [m]."""
-
-    pose: Pose
-    fov: float
-    near: float
 
 
 def visibility(picture: int) -> float:

@@ -90,16 +90,16 @@ class Surface:
         self._plain = render_body(shapes, name, copies)
         self._textured: sapien.Entity | None = None
         self._image: sapien.render.RenderTexture2D | None = None
-        self._shown = self._plain
-        add_copies(scene, self._shown)
+        self.shown = self._plain
+        add_copies(scene, self.shown)
 
     def show(self, image: NDArray[np.uint8] | None) -> None:
         """With this sRGB image (height, width, 3), or plain."""
         wanted = self._plain if image is None else self._with(image)
-        if wanted is not self._shown:
-            self._scene.remove_entity(self._shown)
+        if wanted is not self.shown:
+            self._scene.remove_entity(self.shown)
             add_copies(self._scene, wanted)
-            self._shown = wanted
+            self.shown = wanted
 
     def _with(self, image: NDArray[np.uint8]) -> sapien.Entity:
         from robospa.harness.sim.render_bodies import image_texture, textured_body
@@ -114,8 +114,8 @@ class Surface:
 
     def draw_last(self) -> None:
         """Come behind all else that is in the scene by now."""
-        self._scene.remove_entity(self._shown)
-        add_copies(self._scene, self._shown)
+        self._scene.remove_entity(self.shown)
+        add_copies(self._scene, self.shown)
 
     def place(self, pose: Pose) -> None:
         """Stand there, plain or not."""
@@ -179,6 +179,10 @@ class DrawnFurniture:
         self._table.show(self._image(surroundings.table))
         self._table.place(Pose(table_at))
         self._shine(surroundings.lights, AMBIENT)
+
+    def table(self) -> sapien.Entity:
+        """The table as it is shown."""
+        return self._table.shown
 
     def draw_last(self) -> None:
         """Be drawn behind all that is in the scene by now: what it hides then costs nothing."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -20,9 +21,8 @@ from robospa.action_space import ARMS
 from robospa.geometry import Pose
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.sim import cameras as pictures
-from robospa.harness.sim.cameras import CameraView
 from robospa.harness.sim.furniture import DrawnFurniture
-from robospa.harness.world import RenderUnavailable
+from robospa.harness.world import OTHER, TABLE, CameraView, RenderUnavailable
 from robospa.observation import CameraSpec
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Hinge, ObjectModel, Params, Shape, Skin
@@ -68,7 +68,7 @@ class Renderer:
 
         self._scene: sapien.Scene = sapien.Scene([self._system])
         self._copies = pictures.MOST if self._system.device.name.startswith(SOFTWARE) else 1
-        self._cameras: dict[tuple[str, int, int], sapien.render.RenderCameraComponent] = {}
+        self._cameras: dict[tuple[CameraSpec, Path], sapien.render.RenderCameraComponent] = {}
         self._robot: list[dict[str, sapien.Entity]] = []
         self._objects: dict[str, sapien.Entity] = {}
         self._parts: dict[str, tuple[sapien.Entity, Hinge]] = {}
@@ -139,12 +139,43 @@ class Renderer:
     ) -> list[NDArray[np.uint8]]:
         """One RGB image (height, width, 3) per camera, of the links and objects as posed.
 
-        Doors and lids stand at their angle [rad] in `hinges`, closed if that is not given. The
-        lights of some scenes depend on `step`, the physics step of this instant.
-
-        Objects that are not in `poses` do not exist yet and are not drawn. ValueError for a camera
-        that this robot does not have, or a size that no image can have.
+        The lights of some scenes depend on `step`, the physics step of this instant; for the rest
+        see `_pose`. ValueError for a camera that this robot does not have, or a size that no image
+        can have.
         """
+        self._pose(links, poses, hinges)
+        if self._loaded is not None:
+            self._room.light(self._loaded.surroundings.lights, step)
+        return self._take([self.view(spec, links) for spec in cameras], cameras)
+
+    def identify(
+        self,
+        spec: CameraSpec,
+        links: Links,
+        poses: Mapping[str, Pose],
+        hinges: Mapping[str, float] = MappingProxyType({}),
+    ) -> NDArray[np.int16]:
+        """What each pixel of that picture shows, (height, width): see `World.identify`."""
+        self._pose(links, poses, hinges)
+        assert self._loaded is not None
+        for index, item in enumerate(self._loaded.everything):
+            for entity in (self._objects.get(item.name), self._parts.get(item.name, (None,))[0]):
+                if entity is not None:
+                    pictures.mark(entity, index + 1)
+        table = len(self._loaded.everything) + 1
+        pictures.mark(self._room.table(), table)
+        camera = self._camera(spec, self.view(spec, links), pictures.IDS)
+        self._scene.update_render()
+        camera.take_picture()
+        number, up = pictures.numbers(camera)
+        found = np.where(number == 0, OTHER, number - 1)
+        found[number == table] = OTHER
+        found[(number == table) & (up > 0)] = TABLE
+        return found.astype(np.int16)
+
+    def _pose(self, links: Links, poses: Mapping[str, Pose], hinges: Mapping[str, float]) -> None:
+        """Put the links and objects where they are. Doors and lids stand at their angle [rad] in
+        `hinges`, closed if that is not given; objects that are not in `poses` do not exist yet."""
         for entities, here in zip(self._robot, links, strict=True):
             for link, entity in entities.items():
                 self._place(entity, here[link])
@@ -161,10 +192,6 @@ class Renderer:
         if self._grew:
             self._room.draw_last()
             self._grew = False
-        if self._loaded is not None:
-            self._room.light(self._loaded.surroundings.lights, step)
-        views = [self._view(spec, links) for spec in cameras]
-        return self._take(views, cameras)
 
     def _take(
         self, views: Sequence[CameraView], cameras: Sequence[CameraSpec]
@@ -207,7 +234,8 @@ class Renderer:
 
         entity.pose = to_sapien(pose)
 
-    def _view(self, spec: CameraSpec, links: Links) -> CameraView:
+    def view(self, spec: CameraSpec, links: Links) -> CameraView:
+        """Where the camera of this picture is; ValueError as for `render`."""
         assert self._embodiment is not None
         if not (0 < spec.width <= LARGEST and 0 < spec.height <= LARGEST):
             raise ValueError(
@@ -215,15 +243,18 @@ class Renderer:
                 f"sizes are 1 to {LARGEST}"
             )
         view = camera_view(self._embodiment, spec.name, links)
+        view = replace(view, aspect=spec.width / spec.height)
         if spec.name == "head" and self._loaded is not None:
             return replace(view, pose=Pose(self._loaded.surroundings.camera_shift) * view.pose)
         return view
 
-    def _camera(self, spec: CameraSpec, view: CameraView) -> sapien.render.RenderCameraComponent:
+    def _camera(
+        self, spec: CameraSpec, view: CameraView, shader: Path = pictures.SHADER
+    ) -> sapien.render.RenderCameraComponent:
         """The camera of `spec`, made on first use and put there."""
-        key = (spec.name, spec.width, spec.height)
+        key = (spec, shader)
         if key not in self._cameras:
-            camera = pictures.new_camera(self._scene, spec.width, spec.height)
+            camera = pictures.new_camera(self._scene, spec.width, spec.height, str(shader))
             camera.set_fovy(view.fov, compute_x=True)
             camera.near, camera.far = view.near, pictures.FAR
             self._cameras[key] = camera

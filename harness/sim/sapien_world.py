@@ -32,7 +32,7 @@ from robospa.tasks.shapes import ObjectModel, Params
 from robospa.tasks.snapshot import Contact, Snapshot, snapshot_to_json
 
 if TYPE_CHECKING:
-    from robospa.harness.sim.renderer import Renderer
+    from robospa.harness.sim.renderer import Links, Renderer
 
 Models = Callable[[str, Params], ObjectModel]
 
@@ -288,17 +288,32 @@ class SapienWorld:
 
     def draw(self, still: SapienState, cameras: Sequence[CameraSpec]) -> list[NDArray[np.uint8]]:
         """Images of a still of the loaded scene; RuntimeError for that of another one."""
-        physics = self._loaded()
-        if still.scene is not self._scene:
-            raise RuntimeError("a still was to be drawn after its world had loaded another scene")
+        return self._drawing().render(cameras, *self._posed(still), still.step)
+
+    def identify(self, camera: CameraSpec) -> NDArray[np.int16]:
+        """See `robospa.harness.world.World`."""
+        return self._drawing().identify(camera, *self._posed(self.still()))
+
+    def view(self, camera: CameraSpec) -> world.CameraView:
+        """See `robospa.harness.world.World`."""
+        return self._drawing().view(camera, self._posed(self.still())[0])
+
+    def _drawing(self) -> Renderer:
+        """The renderer with the loaded scene."""
+        self._loaded()
         renderer = self._renderer or self._open_renderer()
         renderer.sync(self._scene, self._embodiment, self._model)
+        return renderer
+
+    def _posed(self, still: SapienState) -> tuple[Links, PoseTable, dict[str, float]]:
+        """Poses of links and objects, and angles of doors and lids [rad]."""
+        if still.scene is not self._scene:
+            raise RuntimeError("a still was to be drawn after its world had loaded another scene")
         links = [
             {link: unpack(still.packed, row) for link, row in rows.items()}
-            for rows in physics.links
+            for rows in self._loaded().links
         ]
-        poses = PoseTable(still.packed, still.rows)
-        return renderer.render(cameras, links, poses, dict(still.hinges), still.step)
+        return links, PoseTable(still.packed, still.rows), dict(still.hinges)
 
     def _open_renderer(self) -> Renderer:
         if self._render is False:

@@ -19,6 +19,8 @@ LEAD = "lead"
 CHUNKS, LAST_QUERY = "chunks", "last_query"
 """The diagnostics of a trial's queries: how many were followed by so many actions until the next,
 by that number, and how many actions had been begun at the last one."""
+USAGE = "usage"
+"""The diagnostic that says what a trial has used of what is paid for, in all its attempts."""
 
 END_REASONS = (
     "success",

@@ -26,6 +26,7 @@ from robospa.results.scoring.scores import (
     level_name,
     score_run,
 )
+from robospa.results.scoring.usage import usage_table
 from robospa.results.statistics.intervals import Estimate
 from robospa.results.tables import (
     MISSING,
@@ -126,7 +127,7 @@ def _level_cell(part: VariantScore | AverageScore | None) -> TableCell:
     return TableCell(short(part.values.get("sr")), sign=MISSING * bool(part.missing))
 
 
-BESIDE = (grounding_table, comparable_table)
+BESIDE = (grounding_table, comparable_table, usage_table)
 """Tables that a report has beside the paper's."""
 
 

@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from robot_at_home import at_home
 
 from robospa.baselines import blind, hold, random, replay
-from robospa.baselines.oracle import FailingOracle, create_failing
+from robospa.baselines.oracle import create_failing
 from robospa.baselines.reactive import FASTEST, SNAP, create, line
 from robospa.geometry import Pose
-from robospa.harness.demonstrations.changed_plans import KINDS
 from robospa.harness.running.record_store import write_actions
 from robospa.harness.skills.pick import pick
 from robospa.harness.skills.workspace import Steps, Workspace
@@ -156,21 +155,6 @@ def test_random_depends_on_the_policy_seed_and_the_step_only() -> None:
     assert not np.array_equal(policy.infer(seen(20)), policy.infer(seen(30)))
 
 
-def test_random_moves_otherwise_with_another_policy_seed() -> None:
-    chunks = []
-    for seed in (1, 2):
-        policy = random.create()
-        policy.reset(TrialInfo("T", "aloha-agilex", "Go.", seed))
-        chunks.append(policy.infer(seen()))
-    assert not np.array_equal(*chunks)
-
-
-def test_random_keeps_grippers_in_range() -> None:
-    chunk = random.create().infer(seen())
-    assert chunk.shape == (random.CHUNK, 14)
-    assert ((chunk[:, [6, 13]] >= 0) & (chunk[:, [6, 13]] <= 1)).all()
-
-
 def test_replay_sends_exactly_what_was_recorded(tmp_path: Path) -> None:
     actions = np.random.default_rng(0).normal(size=(130, 14)).astype(np.float32)
     write_actions(tmp_path, KEY, actions, "joint")
@@ -230,12 +214,6 @@ def test_what_cannot_be_is_refused(given: dict[str, str], says: str) -> None:
         create(**given)
 
 
-def test_it_says_what_it_knows() -> None:
-    spec = create(chunk="5").spec
-    assert spec.privileged and spec.needs_trial_key and spec.horizon == 5
-    assert create(feedback="no").spec.name == "reactive:open-loop"
-
-
 # ---------------------------------------- policies that fail on purpose: that they fail as they say
 
 
@@ -245,12 +223,6 @@ SEED = 930_000
 def test_an_unknown_mistake_is_refused_at_once() -> None:
     with pytest.raises(ValueError, match="no mistake 'sulks'; there are neighbour"):
         create_failing("sulks")
-
-
-def test_the_spec_says_which_mistake_it_is() -> None:
-    for kind in KINDS:
-        spec = FailingOracle(kind).spec
-        assert (spec.name, spec.privileged) == (f"mistakes:{kind}", True)
 
 
 @pytest.mark.sim

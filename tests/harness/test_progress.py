@@ -9,7 +9,7 @@ import types
 import pytest
 from fake_runs import trial_record
 
-from robospa.harness.progress import ROWS, Progress, details, summary
+from robospa.harness.progress import Progress, details, summary
 from robospa.harness.running.status import ServerStats, Status
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
@@ -20,15 +20,6 @@ LONG, SHORT = TrialKey("Long", 5, 1), TrialKey("Short", 1, 1)
 def record(key: TrialKey, end: str = "success") -> TrialRecord:
     won = end == "success"
     return trial_record(key, won, end=end)
-
-
-def test_lost_trials_are_no_failures() -> None:
-    stream = io.StringIO()
-    with Progress(2, 0, stream) as progress:
-        progress.add(record(LONG))
-        progress.add(record(SHORT, "infrastructure"))
-        progress.update()
-    assert "success 100.0 %" in stream.getvalue() and "1 lost" in stream.getvalue()
 
 
 def test_plain_lines_where_there_is_no_terminal() -> None:
@@ -55,14 +46,6 @@ def test_films_are_counted_beside_the_trials_and_after_them() -> None:
     assert trials.endswith(", 3 films to make")
     assert first == "films: 0 made, 3 to make"
     assert last == "films: 2 made, 1 to make, 0:00 left"
-
-
-def test_a_terminal_shows_the_films_that_are_still_to_be_made() -> None:
-    stream = Terminal()
-    with Progress(1, 0, stream) as progress:
-        progress.add(record(SHORT, "step_limit"))
-        progress.show_films(0, 3)
-    assert "films: 0 made, 3 to make" in stream.getvalue()
 
 
 class Terminal(io.StringIO):
@@ -99,14 +82,6 @@ def test_the_live_view_shows_speed_servers_and_who_is_slow() -> None:
         "[news] about ws://a",
     ):
         assert text in shown, text
-
-
-def test_of_many_servers_the_live_view_lists_some() -> None:
-    stream = Terminal()
-    with Progress(3, 1, stream) as progress:
-        progress.add(record(LONG))
-        progress.update(status(*(server(f"ws://{n}") for n in range(20))))
-    assert f"and {20 - ROWS} more" in stream.getvalue()
 
 
 def test_a_picture_is_not_drawn_more_often_than_it_can_be_read() -> None:

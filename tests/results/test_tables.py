@@ -257,12 +257,6 @@ def output(capsys: pytest.CaptureFixture[str], *words: str | Path) -> str:
     return said.out
 
 
-@pytest.fixture
-def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Reports without pictures: those with all names are drawn by a test of their own."""
-    monkeypatch.setattr("robospa.results.report.report.draw", lambda *given: [])
-
-
 @pytest.mark.usefixtures("no_figures")
 def test_every_command_prints_names_as_they_are(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str

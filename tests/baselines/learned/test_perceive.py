@@ -10,7 +10,6 @@ torch = pytest.importorskip("torch")
 
 from robospa.baselines.learned import perceive, scenes  # noqa: E402
 from robospa.baselines.learned.steps import KINDS, Seen  # noqa: E402
-from robospa.tasks.families.dustbin import BIN  # noqa: E402
 from robospa.workcell import WORKCELL  # noqa: E402
 
 MUG = Seen("mug", (0.1, -0.05, 0.74), (0.05, 0.04, 0.05), 0.7, (0.1, 0.2, 0.3))
@@ -37,13 +36,6 @@ def test_what_is_labelled_is_told_again() -> None:
     assert (mug.kind, cube.kind) == ("mug", "block")
     assert math.dist(mug.place, MUG.place) < 1e-6 and math.dist(mug.half, MUG.half) < 1e-6
     assert mug.turn == pytest.approx(0.7, abs=1e-6) and cube.turn == pytest.approx(0.2, abs=1e-6)
-
-
-def test_the_dustbin_stands_where_it_always_does() -> None:
-    numbers = np.zeros((1, perceive.NUMBERS + len(KINDS)))
-    numbers[0, perceive.NUMBERS + KINDS.index("dustbin")] = 1
-    (seen,) = perceive.seen_of(numbers, np.array([[10.0, 20.0]]))
-    assert seen.kind == "dustbin" and seen.place == BIN.position
 
 
 def test_a_block_is_labelled_along_its_longer_side() -> None:
@@ -75,8 +67,3 @@ def test_weights_are_kept_at_half_precision(tmp_path: Path) -> None:
     image = torch.zeros(1, 3, 240, 320)
     with torch.inference_mode():
         torch.testing.assert_close(found(image), kept.eval()(image), atol=0.02, rtol=0.02)
-
-
-def test_an_empty_table_shows_nothing_that_is_sure() -> None:
-    looker = perceive.Perceiver(perceive.FindNetwork(), perceive.MeasureNetwork())
-    assert isinstance(looker.look(np.zeros((240, 320, 3), np.uint8)), list)

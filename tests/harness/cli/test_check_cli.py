@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from replay_fakes import CHUNK, SPEC, Learned, episode, grippers, joints
+from replay_fakes import CHUNK, Learned, episode, grippers, joints
 
 from robospa.harness.cli.main import main
 from robospa.harness.convention_check.episodes import write_episode
@@ -65,15 +64,6 @@ def test_a_file_that_cannot_be_read_is_one_sentence_before_the_server_is_asked(
     assert err.count("\n") == 1 and "cannot be read as an HDF5 demonstration" in err
 
 
-def test_a_file_without_instruction_asks_for_one(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    write_episode(tmp_path / "a.hdf5", replace(MADE, instruction=""))
-    with pytest.raises(SystemExit):
-        main(["check", "ws://127.0.0.1:9", "--demo", str(tmp_path / "a.hdf5")])
-    assert "--instruction" in capsys.readouterr().err
-
-
 class Begins(Learned):
     """Answers a chunk that begins near the state it is shown, in conventions of its own."""
 
@@ -116,8 +106,3 @@ def test_hints_do_not_fail_a_server(
 ) -> None:
     code, out, _ = check([], lambda: Begins(MADE, FIRST["metres"][0]), capsys, monkeypatch)
     assert code == 0 and "openings in metres" in out
-
-
-def test_policies_without_joints_are_left_alone() -> None:
-    found, seen = hints(Learned(MADE, spec=replace(SPEC, state="none")))
-    assert found == [] and "not shown" in seen

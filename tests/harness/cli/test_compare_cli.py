@@ -8,10 +8,13 @@ from pathlib import Path
 
 import pytest
 from fake_runs import outcomes, write
+from run_fakes import FakePolicy
 
-from robospa.harness.cli.main import main
-from robospa.results.comparison.compare import heads_of
+from robospa.harness import machine_check
+from robospa.harness.cli.main import COMMANDS, main
+from robospa.protocol.server import ServerThread
 from robospa.results.paper.columns import published_results
+from robospa.tasks.catalog import build_scene, tasks
 
 
 def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
@@ -44,22 +47,6 @@ def test_a_run_against_the_paper_has_a_banner_and_names_over_its_columns(
     code, text, _ = run(capsys, "compare", folder, "pi05", "--json")
     found = json.loads(text)
     assert code == 0 and found["banner"] == banner and len(found["cells"]) == 1
-
-
-def test_two_runs_have_no_banner(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    for name, found in (("one", [1, 1, 0]), ("two", [1, 0, 0])):
-        write(tmp_path / name, outcomes("Pick_Blocks_Size", 1, found))
-    code, text, _ = run(capsys, "compare", str(tmp_path / "one"), str(tmp_path / "two"))
-    assert code == 0
-    assert text.startswith("SR of one minus two")
-    assert "only one  only two" in text
-
-
-def test_names_over_columns_stay_apart() -> None:
-    long = "an-evaluation-of-many-words"
-    assert heads_of("one", "two") == ["one", "two"]
-    assert heads_of(f"{long}-1", f"{long}-2") == ["…n-of-many-words-1", "…n-of-many-words-2"]
-    assert heads_of(f"a-{long}", f"b-{long}") == ["first", "second"]
 
 
 @pytest.mark.parametrize("name", ["pi05", "pi0.5", "π0.5", "PI0_5"])
@@ -102,3 +89,135 @@ def test_lint_of_the_paper_fails_with_its_findings(capsys: pytest.CaptureFixture
     code, text, _ = run(capsys, "report", "paper", "--lint")
     assert code == 1
     assert "8 errors, 0 warnings" in text
+
+
+# ------------------------------------------------------------ `robospa paper` from the command line
+
+
+def run_paper(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as stop:
+        main(("paper", *words))
+    said = capsys.readouterr()
+    code = stop.value.code
+    return (code if isinstance(code, int) else 0), said.out, said.err
+
+
+def test_all_tables_are_written_and_the_errata_told(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    code, out, _ = run_paper(capsys, "--out", str(tmp_path / "paper"), "--no-figures")
+    assert code == 0
+    assert "Overall average" in out
+    assert "2747 printed cells walked; 22 do not follow" in out
+    assert "main, RRR, X-VLA, Drop: printed 28.2, recomputed 26.2" in out
+    names = {path.name for path in (tmp_path / "paper").iterdir()}
+    assert {"tables.md", "tables.tex", "tables.html", "tables.csv", "main.tex"} <= names
+
+
+def test_what_is_printed_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    words = ("--out", str(tmp_path / "p"), "--table", "basic", "--format", "md", "--json")
+    code, out, _ = run_paper(capsys, *words)
+    found = json.loads(out)
+    assert code == 0 and found["checked"] == 2747 and len(found["errata"]) == 22
+    assert found["files"] == [str(tmp_path / "p" / "tables.md")]
+    drop = next(e for e in found["errata"] if (e["row"], e["column"]) == ("RRR", "Drop"))
+    assert (drop["printed"], drop["recomputed"]) == (28.2, 26.2)
+    assert found["table"]["name"] == "basic" and found["table"]["rows"][0]["cells"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--format", "pdf"), "no format is called 'pdf'; there are md, tex, html, csv and all"),
+        (("--table", "mian"), "no table is called 'mian'; there are main,"),
+        (("--mark", "bold"), "no mark is called 'bold'; there are tied, highest, none"),
+        (("--run", "nowhere"), "nowhere is not a run"),
+    ],
+)
+def test_mistakes_are_one_sentence_and_write_nothing(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, words: tuple[str, ...], said: str
+) -> None:
+    code, out, err = run_paper(capsys, "--out", str(tmp_path / "p"), *words)
+    assert (code, out) == (1, "")
+    assert said in err
+    assert len(err.splitlines()) == 1
+    assert not (tmp_path / "p").exists()
+
+
+# --------------- help as wide as the terminal, completion by the shell, and JSON for other programs
+
+
+def output(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    with pytest.raises(SystemExit) as end:
+        main(words)
+    out, err = capsys.readouterr()
+    assert not end.value.code, err
+    return out
+
+
+@pytest.mark.parametrize("columns", [60, 80, 118])
+def test_help_is_as_wide_as_the_terminal(
+    columns: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(columns))
+    widths = [len(line) for line in output(capsys, "eval", "--help").splitlines()]
+    assert columns - 16 < max(widths) <= columns
+
+
+def test_the_list_of_commands_is_not_cut(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    text = " ".join(output(capsys, "--help").split()).partition("Evaluate a policy:")[2]
+    assert "..." not in text
+    assert [summary for summary in COMMANDS.values() if summary not in text] == []
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("robospa ta", "tasks"),
+        ("robospa eval --emb", "--embodiment --embodiments"),
+        ("robospa eval --split ", "heldout train indirect"),
+        ("robospa eval --video f", "failures first"),
+        ("robospa submit ve", "verify"),
+    ],
+)
+def test_the_shell_completes(
+    line: str,
+    expected: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("_ROBOSPA_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", line)
+    monkeypatch.setenv("COMP_CWORD", str(line.count(" ")))
+    assert output(capsys).split() == expected.split()
+
+
+def test_tasks_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    listed = json.loads(output(capsys, "tasks", "--json"))
+    assert [row["name"] for row in listed] == list(tasks())
+    assert listed[0]["levels"]["5"] == {"candidates": 6, "subtasks": 1, "steps": 150}
+    scene = json.loads(output(capsys, "tasks", "pick blocks size", "--level", "2", "--json"))
+    assert scene["digest"] == build_scene("Pick_Blocks_Size", 2, 100000).digest
+    assert set(scene["instructions"]) == {"train", "heldout", "indirect"}
+    assert scene["plan"][0]["skill"] == "Pick"
+
+
+def test_a_server_s_checks_as_json(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        machine_check,
+        "run_checks",
+        lambda: iter([machine_check.SystemCheck("simulator", True, "fine")]),
+    )
+    with ServerThread(policy_factory=FakePolicy) as server:
+        found = json.loads(
+            output(capsys, "check", server.url, "--trials", "0", "--load-seconds", "0", "--json")
+        )
+        machine = json.loads(output(capsys, "check", "--json"))
+    assert found["url"] == server.url and found["passed"]
+    assert {"name", "passed", "detail"} == set(found["checks"][0])
+    assert machine["checks"] == [{"name": "simulator", "ok": True, "detail": "fine", "fix": ""}]

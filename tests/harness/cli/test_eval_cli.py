@@ -188,15 +188,6 @@ def test_ctrl_c_leaves_a_run_that_can_be_resumed(tmp_path: Path) -> None:
 
 
 @quickly
-def test_resuming_with_another_policy_is_refused(tmp_path: Path) -> None:
-    with ServerThread(policy_factory=FakePolicy) as server:
-        robospa(*words_of(server.url, tmp_path / "run", trials=1))
-    code, _, err = robospa(*words_of("run_fakes:other", tmp_path / "run", "--resume", trials=1))
-    assert code == 1
-    assert "policy.spec.name: 'fake' -> 'other'" in err
-
-
-@quickly
 def test_a_torn_line_is_owed_again(tmp_path: Path) -> None:
     words = words_of("run_fakes:FakePolicy", tmp_path / "run", "--workers", "1", trials=2)
     assert robospa(*words)[0] == 0
@@ -260,28 +251,6 @@ def test_a_run_is_repeated_from_the_settings_that_it_keeps(tmp_path: Path) -> No
     assert before.manifest.about.arguments | {"out": str(again), "workers": 1} == (
         after.manifest.about.arguments
     )
-
-
-@quickly
-def test_flags_win_over_the_file(tmp_path: Path) -> None:
-    path = tmp_path / "run.toml"
-    path.write_text(
-        'policy = "nobody"\n[selection]\ntasks = "Pick_Blocks_Size"\nlevels = [3]\ntrials = 1\n'
-    )
-    words = words_of("run_fakes:FakePolicy", tmp_path / "run", "--config", str(path), trials=2)
-    code, _, err = robospa(*words)
-    assert code == 0, err
-    assert sorted((r.key.level, r.key.seed) for r in lines(tmp_path / "run")) == [
-        (1, 100000), (1, 100001), (2, 100000), (2, 100001)
-    ]  # fmt: skip
-
-
-@quickly
-def test_a_policy_on_the_command_line_takes_the_place_of_a_map_in_the_file(tmp_path: Path) -> None:
-    path = tmp_path / "run.toml"
-    path.write_text('policy_map = "nowhere.json"\n')
-    words = words_of("run_fakes:FakePolicy", tmp_path / "run", "--config", str(path), trials=1)
-    assert robospa(*words)[0] == 0
 
 
 @quickly

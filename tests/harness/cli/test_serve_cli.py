@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import threading
-import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,17 +18,13 @@ from fake_runs import KNOWN, make_run, outcomes, write
 
 from robospa.clients import connect
 from robospa.harness.cli import main as cli
-from robospa.harness.cli import serve as command
 from robospa.harness.cli.main import COMMANDS, command_of, main
-from robospa.harness.factory import load_function
 from robospa.harness.official.checkout_world import CheckoutFinding
-from robospa.protocol.options import option, option_table
+from robospa.protocol.options import option
 from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.server import ServerThread
 
 ROOT = Path(__file__).resolve().parents[3]
-MODELS = ("rdt", "lerobot", "go1", "xvla", "openpi")
-"""Pages in docs/policies that are not named as the server."""
 TRIAL = TrialInfo("t", "aloha-agilex", "lift it")
 SEEN = {"step": 0, "instruction": "lift it", "images": {}, "state": np.zeros(14, np.float32)}
 
@@ -165,14 +159,6 @@ def test_options_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     ]
 
 
-@pytest.mark.parametrize("name", MODELS)
-def test_every_shipped_server_is_an_entry_point_with_documented_options(name: str) -> None:
-    points = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]
-    make = load_function(points["robospa.policies"][name])
-    rows = option_table(command.options_class(make))
-    assert rows and all(row.help for row in rows)
-
-
 def test_the_example_with_options_is_served_as_printed(
     served: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -191,25 +177,6 @@ def test_the_example_with_options_is_served_as_printed(
     assert chunks[0].shape == (4, 14)
     assert np.array_equal(chunks[0], chunks[1])
     assert not np.array_equal(chunks[0], chunks[2])
-
-
-def test_a_shared_model_answers_two_connections() -> None:
-    start = threading.Barrier(2, timeout=20)
-    chunks: list[Any] = []
-
-    def ask(url: str) -> None:
-        with connect(url) as policy:
-            policy.reset(TRIAL)
-            start.wait()
-            chunks.append(policy.infer(SEEN))
-
-    with ServerThread(Model(Options("x", 2))) as server:
-        threads = [threading.Thread(target=ask, args=(server.url,)) for _ in range(2)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join(30)
-    assert [chunk.shape for chunk in chunks] == [(2, 14)] * 2
 
 
 # ----------------------- `robospa view`: says where to look, ends when told, refuses what is no run
@@ -298,6 +265,7 @@ def test_every_command_that_reports_has_json() -> None:
     assert having == {name for name, _ in commands()} - set(SILENT)
 
 
+@pytest.mark.usefixtures("no_figures")
 @pytest.mark.parametrize("line", HERE.values(), ids=HERE)
 def test_standard_output_is_one_json_value(line: str, tmp_path: Path) -> None:
     for name, found in (("one", [1, 1, 0]), ("two", [1, 0, 0])):

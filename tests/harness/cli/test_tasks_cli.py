@@ -2,21 +2,34 @@
 
 from __future__ import annotations
 
+import inspect
+import json
+import socket
+import typing
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import typer
+from command_line import robospa
 from numpy.typing import NDArray
+from run_fakes import FakePolicy
 from typer.testing import CliRunner, Result
 
+from robospa import extras
 from robospa.harness.cli import tasks as commands
-from robospa.harness.cli.tasks import describe_skill, per_level, tasks
+from robospa.harness.cli.main import COMMANDS, command_of, main
+from robospa.harness.cli.tasks import describe_skill, tasks
 from robospa.harness.pictures import gallery
+from robospa.harness.seeds.attempt import Attempt
+from robospa.protocol.server import ServerThread
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.catalog import tasks as all_tasks
 from robospa.tasks.plan import Home, Pick, Place, Wait
 from robospa.tasks.scene import Scene
+from robospa.tasks.seeds import ListKey
 
 NAME = "Pick_Blocks_Size"
 
@@ -46,12 +59,6 @@ def test_a_scene_is_described_with_both_instructions() -> None:
     assert all(item.name in done.output for item in scene.objects)
 
 
-def test_a_split_shows_only_its_instruction() -> None:
-    done = run(NAME, "--split", "train", "--no-frame")
-    assert "instruction (train)" in done.output
-    assert "instruction (heldout)" not in done.output
-
-
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -69,14 +76,6 @@ def test_a_bad_argument_is_refused_in_one_sentence(arguments: tuple[str, ...], s
     plain = " ".join(done.output.replace("│", " ").split())
     assert done.exit_code == 2
     assert said in plain
-
-
-@pytest.mark.parametrize(
-    ("values", "text"),
-    [([150] * 5, "150"), ([2, 3, 4, 5, 6], "2..6"), ([3, 6, 8, 9, 12], "3 6 8 9 12"), ([7], "7")],
-)
-def test_the_values_of_all_levels_are_shown_briefly(values: list[int], text: str) -> None:
-    assert per_level(values) == text
 
 
 @pytest.mark.parametrize(
@@ -128,12 +127,6 @@ def test_the_gallery_of_one_task_has_all_its_levels(tmp_path: Path) -> None:
     assert "5 variants in" in done.output and path.stat().st_size < 1_000_000
 
 
-def test_a_gallery_of_what_does_not_exist_is_refused_at_once(tmp_path: Path) -> None:
-    done = run("Pick_Blocks_Size,Pick_Nothing", "--gallery", "--out", str(tmp_path / "sheet.jpg"))
-    assert done.exit_code == 2 and "Pick_Nothing" in done.output
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_settled_scene_skips_seeds_that_do_not_rest() -> None:
     class Restless:
         seen: list[int]
@@ -178,3 +171,134 @@ def test_a_scene_of_the_official_world_is_described_and_drawn(
 def test_a_world_that_cannot_be_drawn_is_said(arguments: tuple[str, ...], said: str) -> None:
     done = run(NAME, *arguments)
     assert done.exit_code == 2 and said in done.output
+
+
+# ------------------------------- every number on a command line has bounds, and a refusal says them
+
+
+CHECKED_LATER = ("level", "fraction")  # where it is known what there is
+
+
+def functions() -> Iterator[tuple[str, Callable[..., object]]]:
+    """Every command of the command line, by name."""
+    for name in COMMANDS:
+        found = command_of(name)
+        if isinstance(found, typer.Typer):
+            for each in found.registered_commands:
+                assert each.callback is not None
+                yield f"{name} {each.callback.__name__}", each.callback
+        else:
+            yield name, found
+
+
+def numbers() -> Iterator[tuple[str, typing.Any]]:
+    """Every numeric flag that is no setting of an evaluation, and what it was made with."""
+    for command, function in functions():
+        own = [p.name for p in inspect.signature(inspect.unwrap(function)).parameters.values()]
+        hints = typing.get_type_hints(function, include_extras=True)
+        for name in own:
+            hint = hints.get(name)
+            made = getattr(hint, "__metadata__", [None])[-1]
+            kinds = set(
+                typing.get_args(getattr(hint, "__origin__", None))
+                or [getattr(hint, "__origin__", None)]
+            )
+            if kinds & {int, float} and name not in CHECKED_LATER:
+                yield f"{command} --{name}", made
+
+
+NUMBERS = dict(numbers())
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_no_flag_takes_every_number(name: str) -> None:
+    made = NUMBERS[name]
+    if made.callback is None:
+        assert made.min is not None, name
+        return
+    for value in (float("nan"), float("inf"), -(10**9), 10**20):
+        with pytest.raises(typer.BadParameter, match="is not from"):
+            made.callback(value)
+    assert made.callback(1) == 1
+
+
+def test_a_refusal_says_the_range(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(["check", "ws://127.0.0.1:9", "--timeout", "-5"])
+    assert stop.value.code == 2
+    assert "-5 is not from 0.001 to 604800" in capsys.readouterr().err
+
+
+# -------------------------------------------- `robospa seeds` from the command line: what it prints
+
+
+def test_the_lists_as_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    key = ListKey("Pick_Blocks_Size", 2)
+    refused = Attempt(100_001, False, reason="does not settle: block_0 moves")
+    found = SimpleNamespace(
+        key=key,
+        accepted=[100_000, 100_002],
+        refused=[refused],
+        given_up=False,
+        row=lambda: [100_000, refused, 100_002],
+    )
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr("robospa.harness.seeds.sweep.sweep_with_bar", lambda *_: [found])
+    words = ("seeds", key.task, "--levels", "2", "--count", "2", "--check", "--json")
+    done = robospa(*words)
+    (row,) = json.loads(done.out)
+    assert done.code == 0 and (row["task"], row["level"]) == (key.task, 2)
+    assert row["accepted"] == [100_000, 100_002]
+    assert row["refused"] == [{"seed": 100_001, "reason": refused.reason}]
+    plain = robospa(*words[:-1]).out
+    assert "2 of 3 seeds accepted" in plain and "seed 100001: does not settle" in plain
+
+
+# ------------------- what a user who got something wrong is told: one sentence that says what to do
+
+
+EVAL = ("--tasks", "Pick_Blocks_Size", "--levels", "1", "--trials", "1", "--out")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("eval", "localhost:8000", *EVAL), "of a server write ws://localhost:8000"),
+        (("eval", "http://localhost:8000", *EVAL), "no address of a policy server"),
+        (("submit", "verify"), "is a folder: a bundle is a .zip"),
+        (("official", "checkout"), "has no folder envs"),
+    ],
+)
+def test_what_is_no_server_bundle_or_checkout(
+    tmp_path: Path, words: tuple[str, ...], said: str
+) -> None:
+    done = robospa(*words, tmp_path)
+    assert (done.code, done.out) == (1, "") and said in done.err
+
+
+def test_a_forgotten_token(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("ROBOSPA_TOKEN", raising=False)
+    with ServerThread(policy_factory=FakePolicy, token="a secret of theirs") as server:
+        done = robospa("eval", server.url, *EVAL, tmp_path / "run")
+    assert "refused the token: missing or wrong token; give the server's token with" in done.err
+
+
+def test_a_port_that_is_taken() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        done = robospa("serve", "hold", "--port", port)
+    said = f"robospa: port {port} of 127.0.0.1 is in use: choose another --port"
+    assert done.code == 1 and done.err.startswith(said)
+
+
+def test_a_collection_names_its_extra_before_it_makes_anything(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def missing(module: str) -> None:
+        raise ModuleNotFoundError(f"No module named {module!r}", name=module)
+
+    monkeypatch.setattr(extras, "import_module", missing)
+    out = tmp_path / "data"
+    done = robospa("collect", "--tasks", "Pick_Blocks_Size", "--episodes", "1", "--out", out)
+    assert done.code == 1 and "pyarrow is not installed; install it with" in done.err
+    assert done.err.endswith("[demos]'\n") and not out.exists()

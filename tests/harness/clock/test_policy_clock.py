@@ -21,7 +21,6 @@ from wire_helpers import SPEC, Recall
 
 from robospa.clients import connect
 from robospa.harness import server_checks as module
-from robospa.harness.cli.main import main
 from robospa.harness.clock.policy_clock import (
     ClockError,
     Latency,
@@ -36,13 +35,12 @@ from robospa.harness.clock.policy_clock import (
     read_latency,
 )
 from robospa.harness.clock.real_time import DECAY, ENTRY, Remaining
-from robospa.harness.replay import replay, replay_record
-from robospa.harness.running.record_store import ActionRecorder, write_actions
-from robospa.harness.server_checks import Load, measure
+from robospa.harness.replay import replay
+from robospa.harness.running.record_store import ActionRecorder
+from robospa.harness.server_checks import measure
 from robospa.harness.trial import run_trial
 from robospa.protocol.errors import WireError
 from robospa.protocol.server import ServerThread
-from robospa.results.records.runs import action_path
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
@@ -99,13 +97,6 @@ def test_draws_follow_from_the_policy_seed_alone() -> None:
     assert first == again
     assert first != list(islice(latency.draws(8), 50))
     assert len(set(first)) == 50
-
-
-def test_draws_have_the_declared_distribution() -> None:
-    latency = parse_latency("p0=50ms,p50=100ms,p95=300ms,p100=900ms")
-    drawn = list(islice(latency.draws(3), 20_000))
-    assert np.percentile(drawn, [50, 95]) == pytest.approx([100, 300], rel=0.03)
-    assert min(drawn) >= 50 and max(drawn) <= 900
 
 
 def test_a_file_of_samples_becomes_their_percentiles(tmp_path: Path) -> None:
@@ -350,17 +341,6 @@ def test_the_recorded_actions_give_the_trial_again_without_a_clock() -> None:
     assert (again.digest, again.actions_digest) == (record.digest, record.actions_digest)
 
 
-def test_a_trial_longer_than_its_step_limit_is_played_again_whole(tmp_path: Path) -> None:
-    key, recorder = TrialKey("Pick_Fake", 2, 100009), ActionRecorder()
-    record = play(Walker(length=1), real("60ms", seconds=60.0), key, recorder=recorder)
-    assert record.success and record.steps == 2 * LIMIT
-    action_path(tmp_path, key).parent.mkdir()
-    write_actions(tmp_path, key, recorder.actions, "joint")
-    again = ActionRecorder()
-    replay_record(TargetWorld(), record, tmp_path, again, parts=parts)
-    assert np.array_equal(again.actions, recorder.actions)
-
-
 def test_real_time_chunking_sends_what_is_left_and_how_much_of_it_will_pass() -> None:
     policy = Walker(length=6)
     record = play(policy, real("120ms", "rtc:3"))
@@ -444,13 +424,6 @@ def test_each_number_of_clients_asks_as_often_and_more_of_them_wait_longer(
     assert list(four.latencies) == sorted(four.latencies)
 
 
-def test_the_clock_of_a_load_is_read_again() -> None:
-    load = Load(1, tuple(float(n) for n in range(10, 51)), 20.0)
-    latency = declared_latency(load.clock)
-    assert latency == load.latency
-    assert [latency.at(s) for s in (0.0, 0.5, 1.0)] == [10.0, 30.0, 50.0]
-
-
 def test_a_server_that_goes_away_is_an_error_and_nobody_waits_for_ever() -> None:
     class Gone(Recall):
         def infer(self, observation: Any) -> np.ndarray:
@@ -461,16 +434,3 @@ def test_a_server_that_goes_away_is_an_error_and_nobody_waits_for_ever() -> None
         pytest.raises(WireError, match="out of memory"),
     ):
         measure(lambda: connect(server.url), 1.0, (3,))
-
-
-def test_check_prints_the_clock_that_stands_for_the_server(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(module, "QUERIES", 3)
-    monkeypatch.setenv("COLUMNS", "200")
-    with ServerThread(policy_factory=lambda: Recall(SPEC)) as server, pytest.raises(SystemExit):
-        main(["check", server.url, "--trials", "0"])
-    lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
-    clocks = [line for line in lines if line.startswith("--clock real:")]
-    assert len(clocks) == 3, "for one, four and eight robots"
-    assert declared_latency(clocks[0].split()[1]) is not None

@@ -26,7 +26,7 @@ from robospa.leaderboard.rules import Reference, check_settings
 from robospa.protocol.policy import PolicySpec
 from robospa.results.comparison.compare import by_axis, compare_results
 from robospa.results.lint import lint_run
-from robospa.results.paper.columns import column_of, published_results
+from robospa.results.paper.columns import column_of
 from robospa.results.records.manifest import PolicySettings, RunError, WorldSettings
 from robospa.results.records.runs import Run, differences, read_run
 from robospa.results.records.trial_record import TrialRecord
@@ -106,14 +106,6 @@ def test_settings_that_cannot_be_are_refused_in_a_sentence(
         make_request(settings(tmp_path, **given), keys=KEYS)
 
 
-def test_the_rest_to_rest_rule_is_the_default_and_gets_no_steps(tmp_path: Path) -> None:
-    request = make_request(
-        updated(EvaluationSettings(), {"policy": "hold", "out": tmp_path}), keys=KEYS
-    )
-    assert request.config.clock is None
-    assert request.config.world_arguments == {"render": None, "control": "rest_to_rest"}
-
-
 def test_a_rate_sets_the_duration_of_actions_in_the_built_in_world(tmp_path: Path) -> None:
     given = {"policy": "hold", "out": tmp_path, "action_rate": 16.67, "clock": "real:0.2s"}
     request = make_request(updated(EvaluationSettings(), given), keys=KEYS)
@@ -186,12 +178,6 @@ def test_another_rate_or_the_benchmark_is_another_suite(tmp_path: Path) -> None:
         other = results_of_run(timed(tmp_path / suite, "", 5, suite))
         with pytest.raises(IncomparableError, match=f"the suites robospa-2-16.67hz and {suite}"):
             compare_results(slow, other)
-
-
-def test_published_numbers_are_of_another_rule(tmp_path: Path) -> None:
-    run = results_of_run(timed(tmp_path / "a", "200ms", 5), "mine")
-    with pytest.raises(IncomparableError, match=r"mine is of the suite robospa-2-16\.67hz"):
-        compare_results(run, published_results("pi0.5"))
 
 
 def test_tables_and_lint_say_that_it_is_real_time_and_rank_it_never(tmp_path: Path) -> None:

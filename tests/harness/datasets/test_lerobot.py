@@ -2,23 +2,45 @@
 
 from __future__ import annotations
 
+import io
 import json
+import zipfile
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
+import av
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from dataset_fakes import fake_episode
-from tiny_datasets import CAMERAS, MANIFEST, SIZE, tiny_dataset, written
+from numpy.typing import NDArray
+from tiny_datasets import CAMERAS, MANIFEST, SIZE, film_of, painted, tiny_dataset, written
 
-from robospa.harness.datasets.episode import DatasetEpisode, EpisodeFilm
-from robospa.harness.datasets.lerobot import TableFiles
+from robospa.harness.datasets.episode import (
+    ARRAYS,
+    HEADER,
+    DatasetEpisode,
+    EpisodeFileError,
+    EpisodeFilm,
+    Stills,
+    episode_bytes,
+    read_episode_file,
+)
+from robospa.harness.datasets.lerobot import FilmFiles, TableFiles
 from robospa.harness.datasets.manifest import DatasetError
 from robospa.harness.datasets.pack import pack
-from robospa.harness.datasets.pictures import FPS, film_frames
+from robospa.harness.datasets.pictures import (
+    CODECS,
+    FPS,
+    EpisodeFilmError,
+    JoinedFilm,
+    check_film,
+    encode,
+    film_frames,
+)
 from robospa.harness.datasets.verify import verify
-from robospa.observation import NAMES
+from robospa.observation import NAMES, CameraSpec
 from robospa.trial import TrialKey
 
 STATS = ("min", "max", "mean", "std", "count", "q01", "q10", "q50", "q90", "q99")
@@ -182,3 +204,200 @@ def test_lines_of_tasks_episodes_and_statistics(tmp_path: Path) -> None:
     assert np.allclose(stats["action"]["max"], episodes[2].action.max(axis=0))
     schema = pq.read_schema(tmp_path / "data/chunk-000/episode_000000.parquet")
     assert b"Image" in schema.metadata[b"huggingface"] and b"List" not in schema.metadata
+
+
+# ----- pictures as they are kept: all frames, in their order, the same bytes every time, and joined
+
+
+CAMERAS_PICTURES = (CameraSpec("head", 64, 48), CameraSpec("front", 32, 32))
+FRAMES = 7
+
+
+def pictures() -> list[list[NDArray[np.uint8]]]:
+    """The head's frames get redder, the front camera's bluer."""
+    return [
+        [np.full((c.height, c.width, 3), [30 * t * (i == 0), 40, 30 * t * i], np.uint8)
+         for i, c in enumerate(CAMERAS_PICTURES)]
+        for t in range(FRAMES)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("codec", CODECS)
+def test_every_frame_is_there_in_its_colours(codec: str) -> None:
+    made = encode(pictures(), CAMERAS_PICTURES, codec)
+    assert made == encode(pictures(), CAMERAS_PICTURES, codec)
+    assert list(made) == ["head", "front"]
+    for i, camera in enumerate(CAMERAS_PICTURES):
+        seen = made[camera.name]
+        assert (seen.codec, seen.width, seen.height) == (codec, camera.width, camera.height)
+        frames = decoded(seen)
+        assert len(frames) == FRAMES
+        for t, frame in enumerate(frames):
+            assert frame.shape == (camera.height, camera.width, 3)
+            wanted = [30 * t * (i == 0), 40, 30 * t * i]
+            assert np.abs(frame.mean(axis=(0, 1)) - wanted).max() < 12, (codec, t)
+
+
+def decoded(seen: EpisodeFilm | Stills) -> list[NDArray[np.uint8]]:
+    if isinstance(seen, Stills):
+        from PIL import Image
+
+        return [np.asarray(Image.open(io.BytesIO(data))) for data in seen.frames]
+    import av
+
+    with av.open(io.BytesIO(seen.data)) as file:
+        frames = list(file.decode(video=0))
+        assert [round(frame.time * FPS, 6) for frame in frames] == list(range(FRAMES))
+        keys = [t for t, frame in enumerate(frames) if frame.key_frame]
+    assert all(b - a <= 2 for a, b in pairwise([*keys, FRAMES]))
+    return [frame.to_ndarray(format="rgb24") for frame in frames]
+
+
+LENGTHS = (5, 1, 8)
+
+
+def joined(path: Path, films: list[bytes]) -> bytes:
+    film = JoinedFilm(path)
+    for data, frames in zip(films, LENGTHS, strict=True):
+        film.append(data, frames)
+    film.close()
+    return path.read_bytes()
+
+
+def test_a_joined_film_shows_every_frame_at_its_time(tmp_path: Path) -> None:
+    films = [film_of(painted(seed, frames)) for seed, frames in enumerate(LENGTHS)]
+    data = joined(tmp_path / "a.mp4", films)
+    own = [frame for film in films for frame in film_frames(film)]
+    found = list(film_frames(data))
+    assert len(found) == sum(LENGTHS)
+    assert all((a == b).all() for a, b in zip(own, found, strict=True))
+    with av.open(io.BytesIO(data)) as film:
+        times = [frame.time for frame in film.decode(video=0)]
+    np.testing.assert_allclose(times, np.arange(sum(LENGTHS)) / FPS, atol=1e-9)
+    assert data == joined(tmp_path / "b.mp4", films)  # the same bytes again
+
+
+def test_films_of_other_encoders_or_lengths_are_refused(tmp_path: Path) -> None:
+    film = JoinedFilm(tmp_path / "film.mp4")
+    film.append(film_of(painted(0, 4)), 4)
+    with pytest.raises(EpisodeFilmError, match="other settings"):
+        film.append(film_of(painted(0, 4)[:, :32]), 4)
+    with pytest.raises(EpisodeFilmError, match="4 frames, and the episode 5"):
+        check_film(film_of(painted(0, 4)), 5)
+    film.close()
+
+
+def test_sampled_frames_are_some_of_all() -> None:
+    data = film_of(painted(0, 30))
+    frames = list(film_frames(data))
+    some = list(film_frames(data, 4))
+    places = [next(t for t, f in enumerate(frames) if (f == s).all()) for s in some]
+    assert len(some) == 4 and places == sorted(places) and places[0] == 0 and places[-1] >= 27
+
+
+def test_film_files_go_on_in_a_next_file(tmp_path: Path) -> None:
+    data = film_of(painted(0, 5))
+    files = FilmFiles(tmp_path, limit=2.2 * len(data) / 1024**2)
+    places = [files.add(data, 5) for _ in range(3)]
+    files.close()
+    assert [place for place, _ in places] == [(0, 0), (0, 0), (0, 1)]
+    assert [round(start * FPS) for _, start in places] == [0, 5, 0]
+    assert len(list(film_frames((tmp_path / "chunk-000/file-001.mp4").read_bytes()))) == 5
+
+
+def test_times_in_long_films_are_found_within_what_lerobot_tolerates() -> None:
+    """It compares times as float32 within 1e-4 s; far into a film those are further apart than
+    that, but at 17 frames a second both ways to a time are rounded to the same one."""
+    inside = np.arange(2000)
+    stored = (inside / FPS).astype(np.float32).astype(float)
+    for start in range(0, 300_000, 1999):
+        asked, shown = start / FPS + stored, (start + inside) / FPS
+        apart = np.abs(asked.astype(np.float32) - shown.astype(np.float32))
+        assert apart.max() < 1e-4
+
+
+# -------------- the file of an episode comes back exactly, and a bad one is refused in one sentence
+
+
+def assert_equal(one: DatasetEpisode, other: DatasetEpisode) -> None:
+    blank = {name: np.zeros(0) for name in ARRAYS}
+    for name in ARRAYS:
+        a, b = getattr(one, name), getattr(other, name)
+        assert a.dtype == b.dtype and a.tobytes() == b.tobytes(), name
+    for name in one.__dataclass_fields__:
+        if name not in blank:
+            assert getattr(one, name) == getattr(other, name), name
+
+
+@pytest.mark.parametrize("stills", [False, True])
+def test_reading_gives_back_every_bit(tmp_path: Path, stills: bool) -> None:
+    episode = fake_episode(kind="midstate", stills=stills)
+    path = tmp_path / "1000007.zip"
+    path.write_bytes(episode_bytes(episode))
+    assert_equal(read_episode_file(path), episode)
+    assert_equal(read_episode_file(path, pictures=False), replace(episode, pictures={}))
+
+
+def test_equal_episodes_have_equal_bytes_and_execute_the_next_command() -> None:
+    assert episode_bytes(fake_episode()) == episode_bytes(fake_episode())
+    episode = fake_episode(frames=3)
+    assert np.array_equal(episode.executed, episode.commanded[[1, 2, 2]])
+
+
+def test_an_episode_whose_arrays_do_not_fit_is_none() -> None:
+    episode = fake_episode(stills=True)
+    with pytest.raises(ValueError, match=r"sim_time has the shape \(4,\), not \(5,\)"):
+        replace(episode, sim_time=episode.sim_time[1:])
+    with pytest.raises(ValueError, match="camera head has 4 frames, not 5"):
+        head = episode.pictures["head"]
+        assert not isinstance(head, EpisodeFilm)
+        replace(episode, pictures={"head": replace(head, frames=head.frames[1:])})
+
+
+@pytest.mark.parametrize("stills", [False, True])
+def test_a_torn_or_changed_file_is_refused(tmp_path: Path, stills: bool) -> None:
+    whole = episode_bytes(fake_episode(stills=stills))
+    path = tmp_path / "x.zip"
+    for length in [0, 1, 100, len(whole) // 2, len(whole) - 30, len(whole) - 1]:
+        path.write_bytes(whole[:length])
+        with pytest.raises(EpisodeFileError) as error:
+            read_episode_file(path)
+        assert str(path) in str(error.value) and "\n" not in str(error.value)
+    for at in range(120, len(whole) - 2000, 997):
+        changed = bytearray(whole)
+        changed[at] ^= 0xFF
+        path.write_bytes(bytes(changed))
+        try:
+            found = read_episode_file(path)
+        except EpisodeFileError as error:
+            assert "\n" not in str(error)
+        else:  # a byte that says nothing, such as a name that is written twice
+            assert_equal(found, fake_episode(stills=stills))
+
+
+def with_header(path: Path, **changes: object) -> Path:
+    """The file of an episode, written anew with other words in its header."""
+    stream = io.BytesIO(episode_bytes(fake_episode()))
+    with zipfile.ZipFile(stream) as old, zipfile.ZipFile(path, "w") as new:
+        for name in old.namelist():
+            data = old.read(name)
+            if name == HEADER:
+                data = json.dumps({**json.loads(data), **changes}).encode()
+            new.writestr(name, data)
+    return path
+
+
+def test_another_layout_or_a_wrong_header_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "x.zip"
+    assert_equal(read_episode_file(with_header(path)), fake_episode())
+    for changes, match in (
+        ({"format": 1}, "layout 1"),
+        ({"stride": -1}, "'stride'"),
+        ({"space": {"kind": "joint", "joints": [7, 7]}}, "commanded has the shape"),
+    ):
+        with pytest.raises(EpisodeFileError, match=match):
+            read_episode_file(with_header(path, **changes))
+    with pytest.raises(EpisodeFileError, match="no file"):
+        read_episode_file(tmp_path / "none.zip")
+    with pytest.raises(EpisodeFileError):
+        read_episode_file(tmp_path)

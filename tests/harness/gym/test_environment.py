@@ -15,7 +15,6 @@ from gymnasium.utils.env_checker import check_env  # noqa: E402
 import robospa.gym  # noqa: E402, F401
 from robospa.harness.gym.environment import (  # noqa: E402
     TaskEnv,
-    Window,
     env_id,
 )
 from robospa.harness.settings import SettingsError  # noqa: E402
@@ -73,14 +72,6 @@ def test_events_come_once_and_progress_with_them() -> None:
         kinds.append([event["kind"] for event in info["events"]])
         done.append(info["done"])
     assert kinds == [[], ["subtask_done"], [], ["success"]] and done == [0, 1, 1, 2]
-
-
-def test_the_step_limit_truncates() -> None:
-    env = fake(step_scale=2 / 150)
-    env.reset(seed=100003)
-    ends = [env.step(np.zeros(14, np.float32))[2:4] for _ in range(2)]
-    assert ends == [(False, False), (False, True)]
-    assert env.unwrapped.record.end == "step_limit"
 
 
 def test_an_action_that_cannot_be_executed_ends_the_trial_and_says_why() -> None:
@@ -159,17 +150,6 @@ def test_pictures_for_arrays_and_for_a_window(monkeypatch: pytest.MonkeyPatch) -
     env.close()
     assert shown[0] == (32, 24) and shown[-1] == ()
     assert set(shown[1:-1]) == {(24, 32, 3)} and len(shown) > 3
-
-
-def test_the_window_is_drawn_by_pygame(monkeypatch: pytest.MonkeyPatch) -> None:
-    pygame = pytest.importorskip("pygame", reason="pygame comes with the extra gym")
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    window = Window("it", 4, 2)
-    image = np.zeros((2, 4, 3), np.uint8)
-    image[1, 3] = 200, 100, 50
-    window.show(image)
-    assert pygame.display.get_surface().get_at((3, 1))[:3] == (200, 100, 50)
-    window.close()
 
 
 def test_environments_in_processes_of_their_own() -> None:

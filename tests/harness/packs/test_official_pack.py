@@ -3,23 +3,41 @@
 from __future__ import annotations
 
 import json
+import math
+import struct
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from made_archive import READS_MESHES, SCALE, make_archive, official_pack_in
-from mesh_writers import Piece, write_glb
+from mesh_writers import Piece, empty_png, glb, glb_bytes, write_glb, write_obj, write_textured_obj
 
-from robospa.harness.official.layout import archive_pack, use_archive
-from robospa.harness.packs.archive import ArchiveError
-from robospa.harness.packs.index import index
+from robospa.harness.official.layout import (
+    OfficialLayout,
+    archive_pack,
+    official_world_parts,
+    use_archive,
+)
+from robospa.harness.packs import mesh_files as checks
+from robospa.harness.packs.archive import Archive, ArchiveError, open_archive
+from robospa.harness.packs.index import THING, clutter_things, digest_of, index
+from robospa.harness.packs.mesh_files import RawMesh, check_glb, read_mesh
 from robospa.harness.packs.official import OfficialPack
 from robospa.harness.settings import Simulation
+from robospa.harness.sim.sapien_world import SapienWorld
+from robospa.harness.trial import task_parts
+from robospa.observation import CameraSpec
+from robospa.tasks import packs
+from robospa.tasks.catalog import build_scene
+from robospa.tasks.modes.clutter import colors_asked, keep_out, taken_kinds
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects import object_model
 from robospa.tasks.official import official_model
+from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Box, ObjectModel
+from robospa.trial import TrialKey
 
 pytestmark = READS_MESHES
 
@@ -163,3 +181,318 @@ def test_a_run_with_another_folder_does_not_get_the_first_ones_models(
         assert look_0().mass != 0.5
         use_archive(Simulation(world="official", assets=folders[1]))
         assert look_0().mass == 0.5
+
+
+# ------------ things of the archive that lie about in randomised scenes of the official world alone
+
+
+KEY = TrialKey("Press_Stapler_Repeat", 1, 3, mode="randomized")
+COLORED = "Stack_Blocks_Color_Order"
+"""A task that names things by their colour."""
+PACKED = OfficialLayout(True, "none")
+
+
+@pytest.fixture(scope="module")
+def pack_objaverse(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OfficialPack]:
+    folder = tmp_path_factory.mktemp("objaverse")
+    root = make_archive(folder / "assets", ["stapler"], ("objects", "clutter"))
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        official_pack_in(root, folder / "cache", patch),
+    ):
+        yield archive_pack()
+
+
+def official(key: TrialKey) -> Scene:
+    return official_world_parts(key, PACKED, {}).scene
+
+
+def things_in(scene: Scene) -> list[str]:
+    return [str(item.params["thing"]) for item in scene.clutter if item.asset == THING]
+
+
+def categories(pack_objaverse: OfficialPack, scene: Scene) -> set[str]:
+    looks = [
+        look for kind in pack_objaverse.clutter(scene) if kind.asset == THING for look in kind.looks
+    ]
+    return {str(look["thing"]).partition("/")[0] for look in looks}
+
+
+def test_the_list_says_which_there_are_and_without_it_all_are(
+    pack_objaverse: OfficialPack, tmp_path: Path
+) -> None:
+    found = clutter_things(pack_objaverse.archive)
+    assert found["toothbrush"] == ("0", "12") and {*found} == {
+        "bottle", "marker", "plush", "toothbrush"
+    }  # fmt: skip
+    assert index(pack_objaverse.archive).clutter == 5
+    archive = open_archive(make_archive(tmp_path, [], ("clutter",)))
+    (tmp_path / "objects" / THING / "list.json").unlink()
+    assert clutter_things(archive)["toothbrush"] == ("0", "12", "3")
+
+
+def test_a_thing_collides_as_its_hull_and_stands_where_its_file_has_it(
+    pack_objaverse: OfficialPack,
+) -> None:
+    made = object_model(THING, {"thing": "marker/0", "pack": "official"})
+    assert len(made.shapes) == 1 and made.size == pytest.approx((0.06, 0.04, 0.06))
+    assert made.bottom == pytest.approx(-0.03)
+    assert made.radius == pytest.approx(math.hypot(0.03, 0.02))
+    assert made.noun == "marker" and made.skin is not None
+    with np.load(made.skin.file) as skin:
+        assert skin["picture"].reshape(-1, 4).mean(axis=0)[:3] == pytest.approx((200, 20, 20))
+
+
+def test_look_alikes_unknown_categories_and_colours_are_left_out(
+    pack_objaverse: OfficialPack,
+) -> None:
+    assert categories(pack_objaverse, official(KEY)) == {"bottle", "marker", "toothbrush"}
+    bottles = build_scene("Put_Bottles_Dustbin", 2, 100_000)
+    assert categories(pack_objaverse, bottles) == {"marker", "toothbrush"}
+    colors = build_scene(COLORED, 2, 100_000)
+    assert colors_asked(colors) and categories(pack_objaverse, colors) == set()
+
+
+def test_they_lie_in_randomised_scenes_by_the_rules_of_all_clutter(
+    pack_objaverse: OfficialPack,
+) -> None:
+    scenes = [official(TrialKey(KEY.task, 1, seed, mode="randomized")) for seed in range(8)]
+    assert len({name for scene in scenes for name in things_in(scene)}) >= 2
+    for scene in scenes:
+        assert Scene.from_json(scene.to_json()) == scene
+        taken = keep_out(scene)
+        for item in scene.clutter:
+            model = object_model(item.asset, item.params)
+            x, y, z = item.pose.position
+            assert z + model.bottom == pytest.approx(scene.table_top)
+            assert taken.free(np.array([x]), np.array([y]), model, scene.table_top)[0]
+            assert item.fixed == (item.asset == THING)
+            assert item.asset not in taken_kinds(scene)
+    assert official(KEY) == official(KEY)
+
+
+def test_no_other_scene_has_them(pack_objaverse: OfficialPack) -> None:
+    clean = TrialKey(KEY.task, 1, 3)
+    assert not official(clean).clutter
+    lit = official(TrialKey(KEY.task, 1, 3, mode="randomized:light"))
+    assert not lit.clutter
+    ours = task_parts(KEY).scene
+    assert ours.clutter and not things_in(ours) and not any(i.fixed for i in ours.clutter)
+
+
+def test_without_such_things_the_clutter_is_that_of_the_library(
+    pack_objaverse: OfficialPack, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("robospa.harness.packs.official.clutter_kinds", lambda *_: ())
+    plain = packs.with_pack(task_parts(KEY).scene, "official")
+    assert official(KEY).clutter == plain.clutter
+
+
+@pytest.mark.parametrize("text", ["[]", '{"list_of_items": {"bottle": 3}}', "{", "[" * 100_000])
+def test_a_broken_list_is_refused_in_a_sentence(tmp_path: Path, text: str) -> None:
+    archive = open_archive(make_archive(tmp_path, [], ("clutter",)))
+    (tmp_path / "objects" / THING / "list.json").write_text(text)
+    with pytest.raises(ArchiveError, match=r"list\.json"):
+        clutter_things(archive)
+
+
+@pytest.mark.parametrize("thing", ["../../secret/0", "bottle", "bottle/../0", "bottle/9", 3, None])
+def test_what_is_no_thing_of_the_archive_is_refused(
+    pack_objaverse: OfficialPack, thing: object
+) -> None:
+    with pytest.raises(ArchiveError, match=r"is no thing of the archive|is missing"):
+        pack_objaverse.model(THING, {"thing": thing})
+
+
+def test_a_thing_in_the_wrong_unit_is_refused_and_its_files_are_hashed(tmp_path: Path) -> None:
+    root = make_archive(tmp_path, [], ("clutter",))
+    archive = open_archive(root)
+    before = digest_of(archive)
+    urdf = root / "objects" / THING / "marker" / "0" / "model.urdf"
+    urdf.write_text(urdf.read_text().replace("<mesh ", '<mesh scale="100 100 100" '))
+    assert digest_of(archive) != before
+    with pytest.raises(ArchiveError, match="'marker/0' of the assets' folder is 6 x 4 x 6 m large"):
+        OfficialPack(archive).model(THING, {"thing": "marker/0"})
+
+
+@pytest.mark.sim
+def test_they_are_drawn_with_their_textures_and_cannot_be_moved(
+    pack_objaverse: OfficialPack,
+) -> None:
+    seeds = range(3, 40)
+    keys = [TrialKey(KEY.task, 1, seed, mode="randomized:clutter") for seed in seeds]
+    scene = next(s for s in map(official, keys) if len(things_in(s)) > 1)
+    world = SapienWorld(render=True)
+    world.load(scene)
+    image = world.render(CameraSpec("head", 160, 120)).astype(int)
+    poses = world.snapshot().poses
+    world.close()
+    assert ((image[..., 0] > 100) & (image[..., 1] < 60)).sum() > 20
+    for item in scene.clutter:
+        if item.fixed:
+            assert poses[item.name].position == pytest.approx(item.pose.position, abs=1e-6)
+
+
+# ---- mesh files: what is read of them, and hostile GLB files, refused before anything is allocated
+
+
+RED, GREEN = (220, 30, 30), (20, 180, 60)
+CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+TWO = [Piece(CORNERS, FACES, RED), Piece(CORNERS + 2, FACES, GREEN)]
+
+
+def read(folder: Path, name: str) -> RawMesh:
+    return read_mesh(folder / "objects" / name, Archive(folder).inside)
+
+
+def colours(mesh: RawMesh) -> list[tuple[int, ...]]:
+    """What the picture shows at each vertex."""
+    side = len(mesh.picture)
+    at = np.minimum((mesh.uv * side).astype(int), side - 1)
+    return [tuple(mesh.picture[row, column, :3].tolist()) for column, row in at]
+
+
+@pytest.mark.parametrize("ending", ["glb", "obj"])
+def test_several_meshes_become_one_with_one_picture(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / "objects" / f"two.{ending}"
+    (write_glb if ending == "glb" else write_obj)(path, TWO)
+    mesh = read(tmp_path, path.name)
+    assert len(mesh.faces) == 8 and mesh.faces.max() == len(mesh.vertices) - 1
+    seen = dict(zip(map(tuple, mesh.vertices.tolist()), colours(mesh), strict=True))
+    for place, expected in (((1, 0, 0), RED), ((3, 2, 2), GREEN)):
+        assert np.abs(np.subtract(seen[place], expected)).max() <= 2
+
+
+def with_picture(picture: bytes) -> bytes:
+    """A GLB file with another picture than its own."""
+    header, data = glb(TWO)
+    view = header["bufferViews"][header["images"][0]["bufferView"]]
+    view |= {"byteOffset": len(data), "byteLength": len(picture)}
+    data += picture + b"\0" * (-len(picture) % 4)
+    header["buffers"][0]["byteLength"] = len(data)
+    return glb_bytes(header, data)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (with_picture(empty_png(9000, 16)), "9000x16 pixels"),
+        (with_picture(empty_png(200_000, 200_000)), "unreadable picture"),
+        (with_picture(b"no picture at all"), "unreadable picture"),
+        (with_picture(empty_png(64, 64)), "image file is truncated"),
+        (glb_bytes(*glb([Piece(CORNERS * np.nan, FACES)])), "places that no object can have"),
+        (glb_bytes(*glb([Piece(CORNERS, FACES + 9)])), "base0.glb"),
+    ],
+)
+def test_hostile_files_are_refused_in_a_sentence(
+    tmp_path: Path, content: bytes, message: str
+) -> None:
+    path = tmp_path / "objects" / "base0.glb"
+    path.parent.mkdir()
+    path.write_bytes(content.replace(b"NaN", b"0.0"))
+    with pytest.raises(ArchiveError, match=message):
+        read(tmp_path, "base0.glb")
+
+
+def test_a_missing_file_and_other_formats_are_named(tmp_path: Path) -> None:
+    (tmp_path / "objects").mkdir()
+    with pytest.raises(ArchiveError, match="is missing"):
+        read(tmp_path, "base0.glb")
+    with pytest.raises(ArchiveError, match=r"no \.glb, \.obj, \.stl, \.ply file"):
+        read(tmp_path, "link.dae")
+
+
+@pytest.mark.parametrize("inside", [True, False])
+def test_an_obj_file_takes_nothing_from_outside(tmp_path: Path, inside: bool) -> None:
+    path = tmp_path / "objects" / "x" / "a.obj"
+    write_textured_obj(path, Piece(CORNERS, FACES, (10, 200, 250)))
+    if not inside:
+        (path.parent / "textured.png").rename(tmp_path / "secret.png")
+        path.with_name("textured.mtl").write_text("newmtl picture\nmap_Kd ../../secret.png\n")
+        with pytest.raises(ArchiveError, match="leads out"):
+            read_mesh(path, Archive(tmp_path).inside)
+    else:
+        assert (10, 200, 250) in colours(read_mesh(path, Archive(tmp_path).inside))
+
+
+TRIANGLE = Piece(np.eye(3), np.array([[0, 1, 2]]))
+
+
+def written(folder: Path, content: bytes) -> Path:
+    path = folder / "base0.glb"
+    path.write_bytes(content)
+    return path
+
+
+def test_a_sound_file_passes_and_says_where_its_pictures_are(tmp_path: Path) -> None:
+    path = written(tmp_path, glb_bytes(*glb([TRIANGLE])))
+    ((offset, length),) = check_glb(path)
+    assert path.read_bytes()[offset : offset + length].startswith(b"\x89PNG")
+
+
+def changed(kind: str, **values: Any) -> Callable[[dict[str, Any]], object]:
+    """A header whose first entry of a kind has other values; None is left out."""
+
+    def change(header: dict[str, Any]) -> None:
+        header[kind][0].update(values)
+        header[kind][0] = {k: v for k, v in header[kind][0].items() if v is not None}
+
+    return change
+
+
+def holding(*children: list[int]) -> Callable[[dict[str, Any]], object]:
+    return lambda header: header.update(nodes=[{"children": some} for some in children])
+
+
+CASES: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
+    "huge count": (changed("accessors", count=10**12), "promises 1000000000000 num"),
+    "wide stride": (changed("bufferViews", byteStride=2**40), "promises 3 numbers"),
+    "no data": (changed("accessors", bufferView=None), "not in the file"),
+    "sparse": (changed("accessors", sparse={}), "not in the file"),
+    "negative": (changed("accessors", count=-1), "where a count"),
+    "not whole": (changed("accessors", count=1.5), "where a count"),
+    "strange type": (changed("accessors", type="VEC9"), "no valid GLB"),
+    "long view": (changed("bufferViews", byteLength=10**9), "beyond its data"),
+    "far view": (changed("bufferViews", byteOffset=10**9), "beyond its data"),
+    "long buffer": (changed("buffers", byteLength=10**9), "bytes of data"),
+    "other file": (changed("buffers", uri="../../etc/passwd"), "another file"),
+    "other picture": (lambda h: h["images"].append({"uri": "x.png"}), "picture in another file"),
+    "compressed": (lambda h: h.update(extensionsRequired=["KHR_draco_mesh_compression"]), "KHR_"),
+    "ring": (holding([1], [0]), "hold each other"),
+    "copies": (lambda h: h.update(nodes=[{"mesh": 0}] * 60_000), "vertices, more than"),
+    "pyramid": (holding(*([k + 1, k + 1] for k in range(40)), []), "a node in two places"),
+    "many nodes": (lambda h: h.update(nodes=[{}] * 200_000), "200000 nodes"),
+    "no list": (lambda h: h.update(accessors=7), "no valid GLB"),
+    "a map of nodes": (lambda h: h.update(nodes={"a": 1}), "no valid GLB"),
+    "no primitives": (lambda h: h.update(meshes=[{"primitives": 5}]), "no valid GLB"),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_hostile_glb_files_are_refused_in_a_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, case: str
+) -> None:
+    monkeypatch.setattr(checks, "MOST_VERTICES", 100_000)
+    change, message = CASES[case]
+    header, data = glb([TRIANGLE])
+    change(header)
+    with pytest.raises(ArchiveError, match=message) as refused:
+        check_glb(written(tmp_path, glb_bytes(header, data)))
+    assert "base0.glb" in str(refused.value) and "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "is no GLB file"),
+        (b"version https://git-lfs.github.com/spec/v1\noid sha256:0", "is no GLB file"),
+        (struct.pack("<4sIII4s", b"glTF", 1, 20, 0, b"JSON"), "no GLB file of version 2"),
+        (struct.pack("<4sIII4s", b"glTF", 2, 2**31, 2**31, b"JSON"), "promises 2147483648 bytes"),
+        (struct.pack("<4sIII4s", b"glTF", 2, 24, 4, b"JSON") + b"{]  ", "unreadable header"),
+        (struct.pack("<4sIII4s", b"glTF", 2, 24, 4, b"JSON") + b"[]  ", "no JSON object"),
+    ],
+)
+def test_files_that_are_none_are_refused(tmp_path: Path, content: bytes, message: str) -> None:
+    with pytest.raises(ArchiveError, match=message):
+        check_glb(written(tmp_path, content))

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from command_line import robospa
 from run_fakes import SPEC, FakePolicy
@@ -15,9 +16,11 @@ from robospa.harness.running.policy_probe import (
     ProbedPolicy,
     check_fit,
     over_budget,
+    probe_policies,
     read_map,
     warnings_of,
 )
+from robospa.harness.running.worker import WorkerConfig
 from robospa.protocol.server import ServerThread
 from robospa.results.lint import lint_run
 from robospa.results.records.manifest import RunError
@@ -176,3 +179,21 @@ def test_warnings_and_options_are_printed_and_kept(tmp_path: Path) -> None:
     assert run.manifest.settings.step_scale == 3
     assert all(r.diagnostics["text_budget"] == 4 for r in run.records.values())
     assert "step-limits" in {finding.rule for finding in lint_run(run)}
+
+
+class InMetres(FakePolicy):
+    """Answers openings of its grippers in metres."""
+
+    def infer(self, observation: Any) -> Any:
+        rows = np.repeat(observation["state"][None], 2, axis=0)
+        rows[:, [6, 13]] *= 0.08
+        return rows
+
+
+def test_first_actions_are_looked_at_before_the_trials() -> None:
+    with ServerThread(policy_factory=InMetres) as server:
+        config = WorkerConfig(Path("run"), server.url)
+        found = probe_policies(config, KEYS, look=True)
+        assert probe_policies(config, KEYS)["Pick_A"].hints == ()
+    (said,) = [w for w in warnings_of(found, {}, 1.0) if "metres" in w]
+    assert said.startswith(server.url)

@@ -30,7 +30,6 @@ from robospa.harness.viewer.playback import (
     meshes,
     moments,
     playback_of,
-    srgb,
 )
 from robospa.harness.viewer.show import (
     PoseRecorder,
@@ -99,20 +98,6 @@ def test_a_failure_stands_at_its_moment_and_one_without_at_the_end() -> None:
     assert found[1].text == "failure: target grounding"
     (idle,) = moments(record(False, events=(), category="GAC"), NAMES, 0.3)
     assert idle == Moment(idle.time, "failure: no attempt", failure=True)
-
-
-def test_it_says_which_trial_it_is_and_how_it_ended() -> None:
-    wrong = {"time": 0.2, "kind": "wrong_object", "object": "object_1", "index": -1, "note": ""}
-    lost = playback_of(
-        record(False, events=(wrong,), category="GAC"), TIMES, FRAMES, NAMES, SUBTASKS
-    )
-    assert lost.failure.startswith("target grounding: ")
-    assert "the blue block" in lost.failure
-    trial = played()
-    assert trial.failure == ""
-    assert trial.title == "Stack Two, level 2, seed 7"
-    assert trial.outcome == "success, 1 of 3 subtasks done"
-    assert trial.end == 0.3
 
 
 class Posed(FakeWorld):
@@ -200,10 +185,6 @@ def test_shapes_of_one_colour_are_one_mesh_and_what_only_collides_is_left_out() 
     assert len(red.faces) == 2 * len(white.faces) == 24
     assert np.allclose(red.vertices.max(axis=0), [1.1, 0.2, 0.3])
     assert red.faces.max() < len(red.vertices)
-
-
-def test_linear_colours_become_srgb() -> None:
-    assert srgb(np.array([0.0, 0.5, 2.0])).tolist() == [0, 186, 255]
 
 
 @needs_sapien
@@ -321,13 +302,6 @@ def test_a_trial_goes_by_the_beginning_of_its_name(tmp_path: Path) -> None:
         trial_named(run, TASK)
     with pytest.raises(RunError, match=r"no trial with a result is called 'Nothing'; there are \w"):
         trial_named(run, "Nothing")
-
-
-def test_a_seed_is_no_beginning_of_another(tmp_path: Path) -> None:
-    one = KNOWN[0]
-    keys = [TrialKey(TASK, one.key.level, seed) for seed in (10, 100)]
-    run = make_run(tmp_path / "run", [type(one)(**{**vars(one), "key": key}) for key in keys])
-    assert trial_named(run, f"{TASK}-L{one.key.level}-10").key == keys[0]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,85 @@
+"""What runs have used of what is paid for: answers, tokens and money of policies that ask a model.
+
+A record keeps it as its policy reported it (`robospa.protocol.policy.USAGE`), attempts that did not
+count included; a missing trial has no record, so what it has used is not here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from robospa.results.records.trial_record import USAGE, TrialRecord
+from robospa.results.scoring.grounding import records_of
+from robospa.results.scoring.models import ModelResults
+from robospa.results.tables import Table, TableCell, TableRow
+from robospa.trial import CATEGORY_NAMES
+
+COLUMNS = {
+    "requests": "answers",
+    "repairs": "unusable",
+    "unanswered": "unanswered",
+    "input_tokens": "input tokens",
+    "output_tokens": "output tokens",
+    "cost": "cost",
+    "seconds": "hours",
+    "exhausted": "used up",
+}
+"""Entries of a record, and what their column is called; seconds are shown as hours."""
+NOTE = (
+    "Cost is at the prices that the policy was told; a request without an answer may be paid for "
+    "as well. Used up: trials that ended at a bound on answers, seconds or cost."
+)
+
+
+def used(record: TrialRecord) -> dict[str, float]:
+    """What a trial has used, by the names of COLUMNS; empty where nothing was reported."""
+    found = record.diagnostics.get(USAGE)
+    known = found if isinstance(found, Mapping) else {}
+    return {name: known[name] for name in COLUMNS if isinstance(known.get(name), int | float)}
+
+
+def total(records: Iterable[TrialRecord]) -> dict[str, float]:
+    """The sums over `records`, and `trials`: how many of them report any; empty for none."""
+    rows = [found for record in records if (found := used(record))]
+    return (
+        {"trials": len(rows), **{n: sum(row.get(n, 0) for row in rows) for n in COLUMNS}}
+        if rows
+        else {}
+    )
+
+
+def usage_table(models: Sequence[ModelResults]) -> Table | None:
+    """What the runs have used by category and in all; None where no record says."""
+    rows: list[TableRow] = []
+    for model in models:
+        by_category: dict[str, list[TrialRecord]] = {name: [] for name in CATEGORY_NAMES}
+        for record in records_of(model):
+            by_category.setdefault(record.category, []).append(record)
+        sums = {name: total(of) for name, of in by_category.items()}
+        found = [TableRow(name, _cells(of)) for name, of in sums.items() if of]
+        if found:
+            everything = TableRow("all", _cells(total(records_of(model))), "average")
+            section = [TableRow(model.name, kind="section")] * (len(models) > 1)
+            rows += [*section, *found, everything]
+    heads = ("trials", *COLUMNS.values(), "cost a trial")
+    return Table("usage", "What was used", "", heads, tuple(rows), notes=(NOTE,)) if rows else None
+
+
+def _cells(sums: Mapping[str, float]) -> tuple[TableCell, ...]:
+    counts = {**sums, "seconds": sums["seconds"] / 3600, "each": sums["cost"] / sums["trials"]}
+    styles = {"seconds": ".2f", "cost": ".4f", "each": ".4f"}
+    return tuple(TableCell(f"{n:{styles.get(name, ',.0f')}}", n) for name, n in counts.items())
+
+
+def plan_line(records: Iterable[TrialRecord], trials: int) -> str:
+    """What `trials` trials like these would use, in a sentence; empty where no record says."""
+    sums = total(records)
+    if not sums:
+        return ""
+    n = {name: value * trials / sums["trials"] for name, value in sums.items()}
+    tokens = f"{n['input_tokens']:,.0f} input and {n['output_tokens']:,.0f} output tokens"
+    each = sums["seconds"] / max(1, sums["requests"])
+    return (
+        f"{trials:,} trials like these {sums['trials']:,.0f} would use {n['requests']:,.0f} "
+        f"answers of {each:.1f} s and {tokens}, and cost {n['cost']:.2f}"
+    )
