@@ -15,6 +15,7 @@ from robospa.harness.cli.options import SEED, TRIALS, AsJson, aside, print_json,
 from robospa.harness.datasets.settings import Collection
 from robospa.harness.datasets.workers import MakerError
 from robospa.harness.running.atomic_file import StorageError
+from robospa.harness.running.status import cores
 from robospa.harness.settings import Compute, SettingsError
 
 if TYPE_CHECKING:
@@ -37,7 +38,11 @@ def _more(*flags: str, **given: Any) -> Any:
 def collect(
     out: Annotated[Path | None, typer.Option(help="folder of the data set")] = None,
     layout: Annotated[
-        str, typer.Option("--format", help="lerobot-v3, lerobot-v2.1 or robotwin-hdf5")
+        str,
+        typer.Option(
+            "--format",
+            help="lerobot-v3, lerobot-v2.1 or robotwin-hdf5",
+        ),
     ] = "lerobot-v3",
     resume: Annotated[
         bool, typer.Option("--resume", help="go on with the data set in --out")
@@ -77,6 +82,12 @@ def collect(
         int | None,
         _more(callback=SEED, help="with --record: the scene; default: first accepted one"),
     ] = None,
+    questions: Annotated[
+        bool,
+        typer.Option(
+            "--questions", help="collect pictures and sentences with the object that is asked for"
+        ),
+    ] = False,
     as_json: AsJson = False,
     **given: object,
 ) -> None:
@@ -101,6 +112,17 @@ def collect(
         return
     if out is None:
         raise SettingsError("name a folder for the data set with --out")
+    if questions:
+        from robospa.harness.datasets.questions import collect_questions
+
+        workers = _group(Compute, given).workers or cores()
+        say = aside if as_json else print
+        found = collect_questions(_group(Collection, given), out, workers, say)
+        if as_json:
+            print_json({"out": out, "questions": found})
+        else:
+            print(f"{out}: {found} questions")
+        return
     from robospa.harness.cli.eval import terminable
     from robospa.harness.datasets import collect as collecting
     from robospa.harness.running.executor import RunAborted

@@ -1,0 +1,54 @@
+"""Questions of pointing: a picture and a sentence go out, a point comes back, and the simulator
+says whether it is on the object that is asked for.
+
+Spatial and basic tasks alone: they ask for one object, and the head camera shows all of theirs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.tasks.task import Tracker
+
+REACH = 1 / 64
+"""How far beside an object a point may be and still mean it, in widths of the picture: 5 px of 320,
+as much as a drawn edge is in doubt."""
+
+
+def asked_for(tracker: Tracker) -> str:
+    """The object that the task of a question asks for."""
+    return next(name for name, role in tracker.roles.items() if role.subtasks)
+
+
+def meant(shown: NDArray[np.int16], at: Sequence[float]) -> int:
+    """What the point [u, v] in a picture is on, as `World.identify` numbers it: the object there,
+    else the nearest one within REACH, else what is there."""
+    height, width = shown.shape
+    column, row = at[0] * width, at[1] * height
+    here = int(shown[min(int(row), height - 1), min(int(column), width - 1)])
+    if here >= 0:
+        return here
+    rows, columns = np.nonzero(shown >= 0)
+    far = np.hypot(columns + 0.5 - column, rows + 0.5 - row)
+    if not len(far) or far.min() > REACH * width:
+        return here
+    nearest = far.argmin()
+    return int(shown[rows[nearest], columns[nearest]])
+
+
+def point_on(mask: NDArray[np.bool_]) -> tuple[float, float]:
+    """A point [u, v] on what `mask` (height, width) covers: the pixel of it that is nearest to the
+    mean of all."""
+    rows, columns = np.nonzero(mask)
+    nearest = np.hypot(columns - columns.mean(), rows - rows.mean()).argmin()
+    height, width = mask.shape
+    return float((columns[nearest] + 0.5) / width), float((rows[nearest] + 0.5) / height)
+
+
+def box_of(mask: NDArray[np.bool_]) -> list[int]:
+    """The box around what `mask` covers: left, top, right and bottom [px], the last two beyond."""
+    rows, columns = np.nonzero(mask)
+    return [int(x) for x in (columns.min(), rows.min(), columns.max() + 1, rows.max() + 1)]
