@@ -29,6 +29,7 @@ EXTRAS = {
     "pygame": "gym",
     "mani_skill": "maniskill",
     "wandb": "wandb",
+    "openai": "agent",
     "viser": "view",
 }
 """Module -> the extra that brings it."""

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from robospa.protocol.options import OptionRow
 
 
-MACHINE = ("device", "t5_device", "batch", "code")
+MACHINE = ("device", "t5_device", "batch", "code", "endpoint", "key", "parallel", "log")
 """Options that a server's name leaves out: a policy is the same wherever its model runs."""
 WEIGHTS = ("checkpoint", "path")
 """The same for a policy whose spec names its checkpoint."""
@@ -35,8 +35,8 @@ def serve(
     policy: Annotated[
         str,
         typer.Argument(
-            help="learned, rdt, lerobot, go1, xvla, openpi, oracle, reactive, random, hold, "
-            "replay, mistakes, tries-all, presses-all, commonest, or module:function"
+            help="agent, learned, rdt, lerobot, go1, xvla, openpi, oracle, reactive, random, "
+            "hold, replay, mistakes, tries-all, presses-all, commonest, or module:function"
         ),
     ],
     checkpoint: Annotated[
@@ -51,6 +51,10 @@ def serve(
         list[str] | None,
         typer.Option("--option", "--arg", help="NAME=VALUE for the policy; repeatable"),
     ] = None,
+    endpoint: Annotated[
+        str | None, typer.Option(metavar="URL", help="of `agent`: an OpenAI-compatible endpoint")
+    ] = None,
+    model: Annotated[str | None, typer.Option(help="of `agent`: the model's name there")] = None,
     options: Annotated[
         Path | None, typer.Option(help="JSON file with such options; --option wins")
     ] = None,
@@ -78,8 +82,8 @@ def serve(
     if show_options:
         return _show_options(policy, make)
     given = {**_from_file(options), **option_pairs(option or [])}
-    if checkpoint is not None:
-        given["path"] = str(checkpoint)
+    short = {"path": checkpoint, "endpoint": endpoint, "model": model}
+    given |= {name: str(value) for name, value in short.items() if value is not None}
     with _named_port(host, port):
         run_server(
             host=host,
@@ -159,7 +163,9 @@ def _hosted(
     return {
         "policy_factory" if callable(made) else "policy": made,
         # The name reaches every client, and so a run's manifest.
-        "options": ServerOptions(name=name, max_connections=connections),
+        "options": ServerOptions(
+            name=name, max_connections=connections, threads=getattr(made, "threads", 1)
+        ),
     }
 
 

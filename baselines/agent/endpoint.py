@@ -1,0 +1,289 @@
+"""A question to an OpenAI-compatible endpoint: an answer, or whose fault it is that there is none.
+
+    Away        no connection, no answer in time, a page that is no completion, and every status but
+                those below: it says nothing of the model, so the trial is not scored
+    BadAnswer   the model's own: a refusal, nothing, an answer that was cut off, and 400, 413 or
+                422, with which an endpoint refuses what it was sent
+
+While an endpoint is away it is asked again, not before the time that its `Retry-After` names, until
+the caller's deadline. Every answer is paid for, so every answer is counted, also those that nobody
+can use. The key comes from the environment; it is in no text that leaves this module.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from email.utils import parsedate_to_datetime
+from types import ModuleType
+
+import msgspec
+
+from robospa.extras import need
+from robospa.protocol.errors import CallTimeout, printable, without_secrets
+from robospa.protocol.options import option
+from robospa.schema import Count
+
+REFUSED = (400, 413, 422)
+"""Statuses with which an endpoint refuses what it was sent."""
+FIRST_PAUSE, LONGEST_PAUSE = 0.5, 20.0
+"""[s] between two requests to an endpoint that is away and does not say for how long."""
+LONGEST_ANSWER = 50_000
+"""Characters of an answer that are looked at."""
+
+
+class EndpointError(Exception):
+    """The endpoint cannot be used as it is told to be; the message says what to do."""
+
+    retriable = False
+
+
+class Away(CallTimeout):
+    """The endpoint did not answer, which says nothing of its model; `after` [s] it may be asked
+    again, 0 if it does not say."""
+
+    def __init__(self, text: str, after: float = 0.0) -> None:
+        super().__init__(text)
+        self.after = after
+
+
+class BadAnswer(Exception):
+    """The model answered what is no list of calls: one sentence."""
+
+
+@dataclass
+class Usage:
+    """What a trial has used: whole numbers but for `cost` and `seconds`."""
+
+    requests: int = 0
+    """Answers of the endpoint."""
+    repairs: int = 0
+    """Of these, answers that were no list of calls."""
+    unanswered: int = 0
+    """Requests that the endpoint did not answer; nobody knows whether they are paid for."""
+    input_tokens: int = 0
+    output_tokens: int = 0
+    cost: float = 0.0
+    """At the prices of the options [their currency]."""
+    seconds: float = 0.0
+    """That the answers took [s]; waits for an endpoint that is away are not in it."""
+    exhausted: int = 0
+    """1 if the trial ended because one of its bounds was reached."""
+
+    def add(self, more: Usage) -> None:
+        """Count `more` as well."""
+        for name, value in asdict(more).items():
+            setattr(self, name, getattr(self, name) + value)
+
+
+@dataclass(frozen=True)
+class EndpointOptions:
+    """Where the model is, and how it is asked."""
+
+    endpoint: str = option("", "base URL of the endpoint, such as http://127.0.0.1:8000/v1")
+    model: str = option("", "name of the model there")
+    key: str = option("OPENAI_API_KEY", "environment variable that holds the key, if one is needed")
+    form: str = option("json", "how the model answers: JSON text, or tool calls", ("json", "tools"))
+    max_tokens: Count = option(2000, "tokens of an answer, at most")
+    limit: str = option(
+        "max_tokens",
+        "field of the request that says so",
+        ("max_tokens", "max_completion_tokens"),
+    )
+    extra: str | None = option(
+        None, 'more fields of the request, as JSON, such as {"temperature": 0}'
+    )
+    deadline: float = option(
+        100.0, "seconds for a query, repairs and waits included; less than the client allows (120)"
+    )
+    parallel: Count = option(8, "requests at once, at most")
+    price_in: float = option(0.0, "price of a million input tokens")
+    price_out: float = option(0.0, "price of a million output tokens")
+
+    def price(self, tokens_in: int, tokens_out: int) -> float:
+        """Of so many tokens."""
+        return (tokens_in * self.price_in + tokens_out * self.price_out) / 1e6
+
+
+@dataclass(frozen=True)
+class ChatAnswer:
+    """What the model said: `text`, and the arguments of its tool calls as JSON texts."""
+
+    text: str
+    tools: tuple[str, ...] = ()
+
+
+class _Function(msgspec.Struct):
+    arguments: object = ""
+
+
+class _Tool(msgspec.Struct):
+    function: _Function
+
+
+class _Message(msgspec.Struct):
+    content: object = None
+    refusal: str | None = None
+    tool_calls: list[_Tool] | None = None
+
+
+class _Choice(msgspec.Struct):
+    message: _Message
+    finish_reason: str | None = None
+
+
+class _Tokens(msgspec.Struct):
+    prompt_tokens: int | None = 0
+    completion_tokens: int | None = 0
+
+
+class _Completion(msgspec.Struct):
+    choices: list[_Choice]
+    usage: _Tokens | None = None
+
+
+@dataclass
+class ChatEndpoint:
+    """An endpoint that several threads may ask; one that is away is left alone by all of them."""
+
+    options: EndpointOptions
+    _free: float = 0.0
+    """When it may be asked again, on the monotonic clock."""
+    _why: str = ""
+    """Why not before."""
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def __post_init__(self) -> None:
+        given = self.options
+        if not given.endpoint or not given.model:
+            raise EndpointError("an agent needs an endpoint and a model: --endpoint URL --model M")
+        if without_secrets(given.endpoint) != given.endpoint:
+            raise EndpointError(
+                f"the endpoint's URL holds a secret: put it into the variable {given.key}"
+            )
+        self._key = os.environ.get(given.key, "")
+        self._extra = _extra(given.extra or "{}")
+        self._openai: ModuleType = need("openai")
+        self._client = self._openai.OpenAI(
+            base_url=given.endpoint, api_key=self._key or "none", max_retries=0
+        )
+
+    def check(self) -> None:
+        """Raises EndpointError unless the endpoint is there, lets us in and knows the model; one
+        that lists no models is believed."""
+        try:
+            found = [str(model.id) for model in self._client.models.list(timeout=30.0)]
+        except self._openai.APIStatusError as error:
+            if error.status_code in (401, 403):
+                text = f"set the variable {self.options.key} to a valid key"
+                raise EndpointError(f"{self._said(error)}; {text}") from None
+            return
+        except self._openai.APIConnectionError as error:
+            raise EndpointError(f"{self._said(error)}; start it first") from None
+        except (self._openai.OpenAIError, TypeError, AttributeError, ValueError):
+            return
+        if found and self.options.model not in found:
+            some = printable(", ".join(found), 300)
+            raise EndpointError(
+                f"{self.options.endpoint} has no model {self.options.model!r}; it has {some}"
+            )
+
+    def ask(self, body: Mapping[str, object], until: float, used: Usage) -> ChatAnswer:
+        """The answer to a request, and in `used` (empty) what it cost. Raises BadAnswer; Away at
+        `until`, on the monotonic clock, if there is none."""
+        pause = FIRST_PAUSE
+        while True:
+            self._wait(until)
+            try:
+                return self._once(body, until, used)
+            except Away as error:
+                used.unanswered += 1
+                now = time.monotonic()
+                with self._lock:
+                    self._free = max(self._free, now + (error.after or pause))
+                    self._why = str(error)
+                if self._free >= until:
+                    raise
+            pause = min(2 * pause, LONGEST_PAUSE)
+
+    def _wait(self, until: float) -> None:
+        """Return when the endpoint may be asked; raises Away at `until`."""
+        while (left := self._free - (now := time.monotonic())) > 0:
+            time.sleep(max(min(left, until - now), 0.0))
+            if time.monotonic() >= until:
+                raise Away(f"{self._why}; it may be asked again in {self._free - now:.0f} s")
+
+    def _once(self, body: Mapping[str, object], until: float, used: Usage) -> ChatAnswer:
+        given, began = self.options, time.monotonic()
+        more = {"model": given.model, given.limit: given.max_tokens, "extra_body": self._extra}
+        try:
+            raw = self._client.chat.completions.with_raw_response.create(
+                **body, **more, timeout=max(until - began, 0.01)
+            )
+            found = msgspec.json.decode(raw.content, type=_Completion)
+        except self._openai.APIStatusError as error:
+            if error.status_code in REFUSED:
+                used.requests += 1
+                raise BadAnswer(self._said(error)) from None
+            raise Away(self._said(error), _retry_after(error.response.headers)) from None
+        except self._openai.OpenAIError as error:
+            raise Away(self._said(error)) from None
+        except (msgspec.DecodeError, UnicodeDecodeError):
+            raise Away(f"{given.endpoint} answered something that is no completion") from None
+        used.requests += 1
+        used.seconds += time.monotonic() - began
+        if (tokens := found.usage) is not None:
+            used.input_tokens += max(0, tokens.prompt_tokens or 0)
+            used.output_tokens += max(0, tokens.completion_tokens or 0)
+            used.cost += given.price(used.input_tokens, used.output_tokens)
+        if not found.choices:
+            raise Away(f"{given.endpoint} answered a completion without a choice")
+        return _usable(found.choices[0], given.max_tokens)
+
+    def _said(self, error: Exception) -> str:
+        """The error in one line that says where, without the key."""
+        cause = f" ({error.__cause__})" if error.__cause__ else ""
+        text = f"{self.options.endpoint}: {printable(f'{error}{cause}')}"
+        return text.replace(self._key, "***") if self._key else text
+
+
+def _usable(choice: _Choice, most: int) -> ChatAnswer:
+    """What `choice` says; raises BadAnswer for a refusal, nothing, and what was cut off."""
+    said = choice.message
+    if said.refusal or choice.finish_reason == "content_filter":
+        why = printable(said.refusal or "its filter", 200)
+        raise BadAnswer(f"the model refused to answer ({why})")
+    text = said.content[:LONGEST_ANSWER] if isinstance(said.content, str) else ""
+    given = [one.function.arguments for one in said.tool_calls or ()]
+    tools = [one if isinstance(one, str) else json.dumps(one) for one in given]
+    if choice.finish_reason == "length":
+        raise BadAnswer(f"the answer was cut off after {most} tokens: answer in fewer")
+    if not text.strip() and not tools:
+        raise BadAnswer("the model answered nothing")
+    return ChatAnswer(text, tuple(tool[:LONGEST_ANSWER] for tool in tools))
+
+
+def _retry_after(headers: Mapping[str, str]) -> float:
+    """Seconds that an answer asks to wait; 0 if it does not say. Dates are read as well."""
+    text = headers.get("retry-after", "")
+    try:
+        seconds = float(text)
+    except ValueError:
+        try:
+            seconds = parsedate_to_datetime(text).timestamp() - time.time()
+        except (ValueError, TypeError, OverflowError):
+            return 0.0
+    return seconds if 0.0 < seconds < math.inf else 0.0
+
+
+def _extra(text: str) -> dict[str, object]:
+    """The JSON object in `text`; raises EndpointError."""
+    try:
+        return msgspec.json.decode(text, type=dict[str, object])
+    except msgspec.DecodeError as error:
+        raise EndpointError(f"option extra is no JSON object: {error}") from None

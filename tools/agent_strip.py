@@ -1,0 +1,69 @@
+"""A trial of an agent as a film strip: what it saw, its calls, and what came of them.
+
+`python tools/agent_strip.py FOLDER/TRIAL.jsonl OUT.png` draws what `robospa serve agent --option
+log=FOLDER` has noted down. Points are marked in the picture that they refer to.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import textwrap
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+from matplotlib import pyplot
+from matplotlib.axes import Axes
+
+WIDTH, LETTERS = 3.4, 44
+"""Of a picture [inches], and how many letters of text fit below it."""
+MARKS = {"at": "o", "to": "x"}
+COLOURS = ("tab:red", "tab:blue", "tab:green", "tab:orange", "tab:purple")
+
+
+def answered(path: Path) -> list[dict[str, object]]:
+    """The lines of a trial whose answers were used."""
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    return [line for line in lines if not line["error"]]
+
+
+def draw(axes: Axes, path: Path, line: dict[str, object], feedback: dict[int, str]) -> None:
+    """A picture, the calls that were made at it, and their `feedback` by number."""
+    first = int(str(line["calls"]))
+    picture = pyplot.imread(path.parent / f"{path.stem}-{first}-head.png")
+    height, width = picture.shape[:2]
+    axes.imshow(picture)
+    axes.set_axis_off()
+    text = str(line["answer"])
+    calls = json.loads(text[text.rindex('{"note"') :])["calls"]
+    rows = []
+    for number, (call, colour) in enumerate(zip(calls, COLOURS * 9, strict=False)):
+        for name, mark in MARKS.items():
+            if name in call:
+                u, v = call[name]
+                axes.plot(u * width, v * height, mark, ms=9, mew=2, mec=colour, mfc="none")
+        said = ", ".join(f"{key} {value}" for key, value in call.items() if key != "skill")
+        came = feedback.get(first + number, "the trial ends")
+        rows += textwrap.wrap(f"{first + number + 1}. {call['skill']} {said}: {came}", LETTERS)
+    axes.text(0, 1.03 * height, "\n".join(rows), va="top", fontsize=8, family="monospace")
+
+
+def main(source: str, out: str) -> None:
+    """Draw the trial noted down in `source` as the picture `out`."""
+    path = Path(source)
+    lines = answered(path)
+    texts = "\n".join(map(str, lines[-1]["question"]))  # type: ignore[call-overload]
+    known = [row.partition(". ")[2] for row in texts.splitlines() if row[:1].isdigit()]
+    feedback = {n: str(json.loads(row)["feedback"]) for n, row in enumerate(known)}
+    figure, grid = pyplot.subplots(1, len(lines), figsize=(WIDTH * len(lines), WIDTH))
+    for axes, line in zip([grid] if len(lines) == 1 else grid, lines, strict=True):
+        draw(axes, path, line, feedback)
+    figure.suptitle(str(lines[0]["question"][0]), x=0.01, ha="left", fontsize=10)  # type: ignore[index]
+    figure.subplots_adjust(0.01, 0.25, 0.99, 0.92, 0.03)
+    figure.savefig(out, dpi=110)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
