@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -80,6 +81,14 @@ class LoadedRun(Run):
         )
         kinds |= dict.fromkeys(NUMBERS, "float64")
         return frame.astype(kinds)
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the rows of `to_pandas` as CSV to the file `path`."""
+        columns = trial_columns(self)
+        with open(path, "w", encoding="utf-8", newline="") as file:
+            rows = csv.writer(file)
+            rows.writerow(columns)
+            rows.writerows(zip(*columns.values(), strict=True))
 
     def _repr_html_(self) -> str:
         return run_html(self)

@@ -74,6 +74,7 @@ def _print(found: RunComparison, variants: bool) -> None:
 
     if found.banner:
         print(found.banner)
+    print(found.verdict)
     print(f"{METRIC_NAMES[found.metric]} of {found.first} minus {found.second}, percentage points")
     for note in found.notes:
         print(f"  {note}")

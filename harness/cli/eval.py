@@ -55,6 +55,9 @@ def evaluate(
         typer.Option(help="file of settings, such as RUN/settings.toml; flags win over it"),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="go on with the run in --out")] = False,
+    auto_resume: Annotated[
+        bool, typer.Option("--auto-resume", help="start, or go on if --out holds a run already")
+    ] = False,
     token: Token = None,
     latency: Annotated[
         str | None,
@@ -71,7 +74,7 @@ def evaluate(
     A trial that cannot be run is retried and, if that does not help, reported as missing: it never
     counts as a failure. After Ctrl-C, the same command with --resume continues.
     """
-    from robospa.harness.running.request import make_request
+    from robospa.harness.running.request import goes_on, make_request
 
     settings = EvaluationSettings() if config is None else read_settings(config)
     changes = {name: value for name, value in given_flags(context).items() if name in given}
@@ -81,8 +84,9 @@ def evaluate(
     elif "policy_map" in changes:
         changes["policy"] = ()
     settings = updated(settings, changes)
+    resume = goes_on("auto" if auto_resume else resume, settings.out)
     if latency is not None:
-        _curve(settings, _milliseconds(latency), token, resume, as_json)
+        _curve(settings, _milliseconds(latency), token, resume or auto_resume, as_json)
         return
     run_and_show(make_request(settings, token=token, resume=resume), as_json=as_json)
 

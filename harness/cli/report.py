@@ -129,14 +129,13 @@ def _report(
 
 def _failures(folder: Path, by: str, trials: bool, film: bool, as_json: bool) -> None:
     from robospa.results.failures.labels import (
-        OURS,
         counts_table,
         distribution,
         failed_trials,
-        trials_table,
     )
     from robospa.results.records.action_problems import problem_lines
     from robospa.results.records.runs import read_run
+    from robospa.results.tables import show
 
     found = _make_films(folder) if film else read_run(folder)
     records = list(found.records.values())
@@ -144,12 +143,10 @@ def _failures(folder: Path, by: str, trials: bool, film: bool, as_json: bool) ->
     if as_json:
         print_json(failed if trials else counts)
         return
-    print(trials_table(failed) if trials else counts_table(counts, by))
+    show(failed.table(len(failed)) if trials else counts_table(counts, by))
     if trials:
         return
     print(f"\n{len(failed)} failed trials of {len(found.keys)}, {len(found.missing)} missing")
-    if any(kind in OURS for row in counts.values() for kind in row):
-        print("* not one of the paper's types")
     for line in problem_lines(records):
         print(line)
 

@@ -6,10 +6,10 @@ import secrets
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import cast
+from typing import Literal, cast
 
 from robospa.harness.running.evaluate import evaluate as run_request
-from robospa.harness.running.request import make_request, run_folder
+from robospa.harness.running.request import goes_on, make_request, run_folder
 from robospa.harness.settings import EvaluationSettings, SettingsError, read_settings, updated
 from robospa.protocol.policy import Policy
 from robospa.protocol.server import ServerThread
@@ -26,7 +26,7 @@ def evaluate(
     trials: int | None = None,
     workers: int | None = None,
     out: str | Path | None = None,
-    resume: bool = False,
+    resume: bool | Literal["auto"] = False,
     token: str | None = None,
     config: EvaluationSettings | str | Path | None = None,
     **settings: object,
@@ -50,7 +50,7 @@ def evaluate(
         trials: Trials per variant; 100 by default.
         workers: Worker processes; by default, or 0, as many as keep the cores busy.
         out: Folder of the run; by default a new one under `runs`.
-        resume: Continue the run in `out`.
+        resume: Continue the run in `out`; "auto": if there is one, else start it.
         token: Bearer token of the policy's servers; kept nowhere.
         config: Settings, or a file of them, that the other arguments win over.
         settings: Any other setting of `robospa eval`, such as video="failures" or timeout=30.
@@ -67,19 +67,20 @@ def evaluate(
     named = {"tasks": tasks, "levels": levels, "trials": trials, "workers": workers, "out": out}
     given = {name: value for name, value in named.items() if value is not None}
     asked = updated(_base(config), {**given, **settings})
+    going = goes_on(resume, asked.out)
     if policy is None or isinstance(policy, str | Sequence):
         if policy is not None:
             asked = updated(asked, {"policy": policy, "policy_map": None})
-        request = make_request(asked, token=token, resume=resume)
+        request = make_request(asked, token=token, resume=going)
         run_request(request)
         return load_run(request.config.folder)
     if token is not None:
         raise SettingsError("token goes with policy servers, and this policy is in this process")
     instance, factory = _object_or_factory(policy)
-    asked = _for_one_process(policy, instance, asked, resume)
+    asked = _for_one_process(policy, instance, asked, going)
     secret = secrets.token_urlsafe()
     with ServerThread(instance, policy_factory=factory, token=secret) as server:
-        request = make_request(replace(asked, policy=(server.url,)), token=secret, resume=resume)
+        request = make_request(replace(asked, policy=(server.url,)), token=secret, resume=going)
         # The address ends with this call: whoever uses these settings again names a policy.
         run_request(replace(request, settings=asked, in_process=True))
     return load_run(request.config.folder)

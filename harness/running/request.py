@@ -27,6 +27,7 @@ from robospa.harness.settings import (
 )
 from robospa.harness.worlds import SAPIEN_NAME, WorldKind, world_kind
 from robospa.registry import UnknownName
+from robospa.results.records.manifest import MANIFEST
 from robospa.trial import TrialKey
 
 HELD = 3
@@ -100,6 +101,13 @@ def make_request(
         compute=compute,
         look=kind.name == SAPIEN_NAME,  # another world may have conventions of its own
     )
+
+
+def goes_on(resume: bool | str, out: Path | None) -> bool:
+    """Whether the run in `out` is continued: with "auto" if there is one."""
+    if resume not in (True, False, "auto"):
+        raise SettingsError(f'resume is {resume!r}: give True, False or "auto"')
+    return out is not None and (out / MANIFEST).exists() if resume == "auto" else bool(resume)
 
 
 def check_servers(settings: EvaluationSettings) -> tuple[str, ...]:

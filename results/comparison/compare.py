@@ -49,7 +49,7 @@ from robospa.results.statistics.significance import (
     p_of_interval,
 )
 from robospa.results.tables import Table, TableCell, TableRow, estimate_cell
-from robospa.text import percent_text
+from robospa.text import counted, percent_text
 from robospa.trial import BASIC, CATEGORIES, DIMENSIONS, METRIC_NAMES
 
 
@@ -100,6 +100,22 @@ class RunComparison:
     notes: tuple[str, ...]
     banner: str = ""
 
+    @property
+    def verdict(self) -> str:
+        """What came out, in one sentence; "" if nothing is common."""
+        if not self.groups:
+            return ""
+        row = self.groups[-1]
+        low, high = 100 * row.estimate.low, 100 * row.estimate.high
+        more = "more" if low > 0 else "less" if high < 0 else ""
+        shown = f"{self.first} has {more}" if more else "no difference is shown"
+        same = "the same" if self.paired else "as many"
+        return (
+            f"{METRIC_NAMES[self.metric]}: {self.first} {100 * row.first:z.1f}, {self.second} "
+            f"{100 * row.second:z.1f} on {same} {counted(row.trials, 'trial')}; {shown} "
+            f"(difference {100 * row.estimate.value:+z.1f}, 95 %: {low:+z.1f} to {high:+z.1f})."
+        )
+
     def table(self, variants: bool = False) -> Table:
         """The averages, or all `variants`, as a table: `print` shows it as text, a notebook as
         HTML."""
@@ -107,7 +123,8 @@ class RunComparison:
         return difference_table(self, self.cells if variants else self.groups, title)
 
     def _repr_html_(self) -> str:
-        said = "<br>".join(escape(text) for text in (self.banner, *self.notes) if text)
+        texts = (self.banner, self.verdict, *self.notes)
+        said = "<br>".join(escape(text) for text in texts if text)
         return f"<p>{said}</p>\n{self.table()._repr_html_()}"
 
 

@@ -17,7 +17,7 @@ from robospa.results.failures.attribution import Cause, roles_of, root_of
 from robospa.results.records.action_problems import described, problem_counts
 from robospa.results.records.trial_record import EventRow, TrialRecord
 from robospa.results.tables import Table, TableCell, TableRow, html_fragment
-from robospa.text import markdown_table, plain
+from robospa.text import plain
 from robospa.trial import SPATIAL, TrialKey
 
 NAMES = {
@@ -169,15 +169,17 @@ SHOWN = 100
 """Failures that are printed before the others are only counted."""
 
 
-def counts_table(rows: Mapping[str, Mapping[str, int]], by: str) -> str:
-    """A `distribution` as a table in Markdown."""
+def counts_table(rows: Mapping[str, Mapping[str, int]], by: str) -> Table:
+    """A `distribution` as a table."""
     kinds = [k for k in KINDS if any(k in row for row in rows.values())]
-    head = [by, "failed", *(NAMES[k] + " *" * (k in OURS) for k in kinds)]
-    body = [
-        [name, str(sum(row.values())), *(str(row.get(k, 0)) for k in kinds)]
+    heads = ("failed", *(NAMES[k] + " *" * (k in OURS) for k in kinds))
+    body = tuple(
+        TableRow(name, tuple(TableCell(str(n)) for n in counts))
         for name, row in rows.items()
-    ]
-    return _laid_out(head, body)
+        for counts in [(sum(row.values()), *(row.get(k, 0) for k in kinds))]
+    )
+    notes = ("* not one of the paper's types",) if any(k in OURS for k in kinds) else ()
+    return Table("failures", "", by, heads, body, notes=notes)
 
 
 @dataclass(frozen=True)
@@ -235,15 +237,17 @@ class FailedTrials(list[FailedTrial]):
 
     __repr__ = __str__
 
-    def _repr_html_(self) -> str:
+    def table(self, most: int = SHOWN) -> Table:
+        """The first `most` failures, a row each."""
         rows = tuple(
-            TableRow(f.trial, (TableCell(f.type), TableCell(f.evidence))) for f in self[:SHOWN]
+            TableRow(f.trial, (TableCell(f.type), TableCell(f.evidence))) for f in self[:most]
         )
+        more = self._more() if most < len(self) else ()
         heads = ("type", "evidence")
-        table = Table(
-            "failures", self._title(), "trial", heads, rows, notes=self._more(), words=True
-        )
-        return html_fragment(table)
+        return Table("failures", self._title(), "trial", heads, rows, notes=more, words=True)
+
+    def _repr_html_(self) -> str:
+        return html_fragment(self.table())
 
 
 def failed_trials(records: Iterable[TrialRecord]) -> FailedTrials:
@@ -264,22 +268,3 @@ def failed_trials(records: Iterable[TrialRecord]) -> FailedTrials:
                 )
             )
     return found
-
-
-UNLISTED = ("embodiment", "mode", "split")
-"""Fields that the listing has no column for."""
-
-
-def trials_table(failed: FailedTrials) -> str:
-    """Every failed trial, its type, evidence and when, in Markdown."""
-    head = [field.name for field in fields(FailedTrial) if field.name not in UNLISTED]
-    body = [
-        ["" if (value := getattr(trial, name)) is None else str(value) for name in head]
-        for trial in failed
-    ]
-    return _laid_out(head, body)
-
-
-def _laid_out(head: list[str], body: list[list[str]]) -> str:
-    rows = ([cell.replace("|", "\\|") for cell in line] for line in body)
-    return markdown_table(head, rows, [" --- "] * len(head))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import builtins
+import csv
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -279,6 +280,12 @@ def test_a_row_for_every_listed_trial_and_nothing_said_of_those_without_a_result
     assert "the <small> cube" in columns["evidence"][failed]
     assert columns["unreachable_actions"][failed] == 6
     assert columns["progress"][by_seed[7]] == 1.0
+
+
+def test_rows_are_written_as_csv_without_pandas(run: Run, tmp_path: Path) -> None:
+    run.to_csv(tmp_path / "trials.csv")
+    head, *rows = csv.reader((tmp_path / "trials.csv").read_text().splitlines())
+    assert head == list(trial_columns(run)) and len(rows) == len(run.keys)
 
 
 def test_a_data_frame_averages_over_what_has_a_result(run: Run) -> None:

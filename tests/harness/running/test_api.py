@@ -80,8 +80,10 @@ def test_an_object_serves_one_worker_and_stays_in_this_process(
 def test_a_module_and_class_and_its_settings_again(tmp_path: Path) -> None:
     first = robospa.evaluate("run_fakes:FakePolicy", workers=1, out=tmp_path / "a", **FAKES)
     check(first, tmp_path / "a")
-    again = robospa.evaluate(config=tmp_path / "a" / FILE, out=tmp_path / "b")
+    again = robospa.evaluate(config=tmp_path / "a" / FILE, out=tmp_path / "b", resume="auto")
     assert again.keys == first.keys
+    known = robospa.evaluate(config=tmp_path / "b" / FILE, resume="auto")
+    assert known.records == again.records
     resumed = robospa.evaluate(config=tmp_path / "a" / FILE, resume=True)
     assert resumed.records == first.records
 

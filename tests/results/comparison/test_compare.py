@@ -57,6 +57,7 @@ def test_averages_weigh_categories_the_same_and_say_how_they_were_made(tmp_path:
     assert group(found, "GAC", 1).p == mcnemar_mid_p(2, 0)
     assert group(found, "overall", 1).estimate.value == pytest.approx(0.25)
     assert group(found, "overall", 1).estimate.method == "MOVER on Tango"
+    assert found.verdict.startswith("SR: ") and "on the same 6 trials" in found.verdict
     again = compare_results(
         side(tmp_path / "c", one), side(tmp_path / "d", two), method="bootstrap"
     )
