@@ -54,6 +54,7 @@ class LiveReport:
         self._drawings: list[DrawnFigure] = []
         self._drawn_at = -FIGURES_SECONDS
         self._viewer: subprocess.Popen[str] | None = None
+        self._viewer_lock = threading.Lock()
         self.read()
 
     def close(self) -> None:
@@ -66,7 +67,7 @@ class LiveReport:
     def in_3d(self, trial: str) -> str:
         """The address at which `trial` is played in 3-D from now on, in place of the one before;
         raises RunError with the reason if it cannot be."""
-        with self._lock:
+        with self._viewer_lock:
             if self._viewer is not None:
                 self._viewer.terminate()
                 self._viewer.wait()

@@ -311,6 +311,8 @@ function showFilms() {
     films.append(make("div", {}, make("h3", {}, `${words(trial.task)} L${trial.level}: `, end), pane(trial)));
   }
 }
+const intervals = document.getElementById("intervals");
+if (intervals && innerWidth < 640) intervals.checked = false; // on a phone all levels fit without them
 fillFilters();
 showFilms();
 if (location.hash.includes("=")) goToAddress();
