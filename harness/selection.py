@@ -52,8 +52,8 @@ def parse_numbers(text: str, what: str) -> list[int]:
 
 
 def parse_levels(text: str) -> list[int]:
-    """Levels of a list like `1,3-5`; raises SettingsError beyond 1 to 5."""
-    levels = parse_numbers(text, "levels")
+    """Levels of a list like `1,3-5` or `L1,L3-L5`; raises SettingsError beyond 1 to 5."""
+    levels = parse_numbers(re.sub(r"\bL(?=\d)", "", text), "levels")
     wrong = [n for n in levels if n not in range(1, 6)]
     if wrong:
         raise SettingsError(f"there is no level {wrong[0]}; levels are 1 to 5")

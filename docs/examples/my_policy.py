@@ -17,7 +17,7 @@ class MyPolicy:
 
     spec = PolicySpec(
         name="my-policy",
-        cameras=(CameraSpec("head", 224, 224),),  # only this is rendered and sent
+        cameras=(CameraSpec("head", 224, 224),),  # also left_wrist, right_wrist, front, third
         action="joint",  # left arm 6, left gripper, right arm 6, right gripper
         horizon=8,  # at most 8 actions a chunk
         checkpoint="no weights",  # else a text that changes with them: a revision, a hash

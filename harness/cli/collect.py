@@ -36,6 +36,7 @@ def _more(*flags: str, **given: Any) -> Any:
 
 @with_flags([Collection, Compute], first=FIRST)
 def collect(
+    folder: Annotated[Path | None, typer.Argument(help="the same as --out")] = None,
     out: Annotated[Path | None, typer.Option(help="folder of the data set")] = None,
     layout: Annotated[
         str,
@@ -98,6 +99,9 @@ def collect(
     step limit; else the next seed takes its place. What is done is on disk: after Ctrl-C, or
     whatever else, the same command with --resume goes on, and ends with the same bytes.
     """
+    if folder is not None and out is not None:
+        raise SettingsError(f"{folder} and --out {out} name two folders: give one of them")
+    out = folder or out
     if verify is not None:
         _verify(verify, replays, as_json)
         return
@@ -113,15 +117,7 @@ def collect(
     if out is None:
         raise SettingsError("name a folder for the data set with --out")
     if questions:
-        from robospa.harness.datasets.questions import collect_questions
-
-        workers = _group(Compute, given).workers or cores()
-        say = aside if as_json else print
-        found = collect_questions(_group(Collection, given), out, workers, say)
-        if as_json:
-            print_json({"out": out, "questions": found})
-        else:
-            print(f"{out}: {found} questions")
+        _questions(_group(Collection, given), out, _group(Compute, given).workers, as_json)
         return
     from robospa.harness.cli.eval import terminable
     from robospa.harness.datasets import collect as collecting
@@ -156,6 +152,16 @@ def collect(
         print(f"{out}: {result.episodes} episodes; robospa collect --verify {out} checks them")
     if result.missing:
         raise typer.Exit(1)
+
+
+def _questions(asked: Collection, out: Path, workers: int, as_json: bool) -> None:
+    from robospa.harness.datasets.questions import collect_questions
+
+    found = collect_questions(asked, out, workers or cores(), aside if as_json else print)
+    if as_json:
+        print_json({"out": out, "questions": found})
+    else:
+        print(f"{out}: {found} questions")
 
 
 def _group(kind: type[T], given: Mapping[str, object]) -> T:

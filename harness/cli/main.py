@@ -10,6 +10,7 @@ import importlib
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -91,6 +92,8 @@ def _run(words: list[str]) -> None:
         raise TooOld(
             f"robospa {chosen} needs Python 3.11 or later; on this one only robospa serve runs"
         )
+    if words[:1] == ["submit"] and len(words) > 1 and Path(words[1]).exists():
+        words.insert(1, "pack" if Path(words[1]).is_dir() else "verify")
     app = typer.Typer(
         name="robospa",
         cls=SectionedGroup,

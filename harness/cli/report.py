@@ -38,7 +38,7 @@ Samples = Annotated[
 
 
 def report(
-    run: Annotated[list[Path], typer.Argument(help="folders of runs, side by side")],
+    run: Annotated[list[Path], typer.Argument(help="runs, or one folder of runs, side by side")],
     with_published: Annotated[
         bool, typer.Option("--with-published", help="put the four published models beside them")
     ] = False,
@@ -102,6 +102,7 @@ def _report(
     folders: Sequence[Path], with_published: bool, ci: str, out: Path | None, as_json: bool
 ) -> None:
     from robospa.results.paper.published import load
+    from robospa.results.records.manifest import MANIFEST
     from robospa.results.records.runs import read_run
     from robospa.results.report.page import write_report
     from robospa.results.report.report import make_report
@@ -110,6 +111,8 @@ def _report(
 
     if ci not in METHODS:
         raise ValueError(f"no interval is called {ci!r}; there are {', '.join(METHODS)}")
+    if len(folders) == 1 and (inside := sorted(folders[0].glob(f"*/{MANIFEST}"))):
+        out, folders = out or folders[0] / "report", [found.parent for found in inside]
     if len(folders) > 1 and out is None:
         raise ValueError("a report of several runs belongs to none of them; say where with --out")
     found = [read_run(folder) for folder in folders]

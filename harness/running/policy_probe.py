@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from robospa.harness.clock.policy_clock import PolicyClock
 from robospa.harness.factory import is_url, open_policy
 from robospa.harness.robots import embodiment
+from robospa.observation import CAMERAS
 from robospa.protocol.client import Identity, identity_of
 from robospa.protocol.policy import SKILL, PolicySpec, has
 from robospa.results.records.manifest import PolicySettings, RunError
@@ -180,9 +181,14 @@ def _flat(settings: PolicySettings) -> dict[str, object]:
 
 
 def check_fit(policy: ProbedPolicy, keys: Sequence[TrialKey]) -> None:
-    """Raises RunError if the policy does not drive a robot that is asked for, or if its actions
-    have another number of columns."""
+    """Raises RunError if the policy does not drive a robot that is asked for, if its actions have
+    another number of columns, or if it asks for a camera that there is not."""
     spec = policy.spec
+    if unknown := [camera.name for camera in spec.cameras if camera.name not in CAMERAS]:
+        raise RunError(
+            f"the policy {spec.name!r} asks for the camera {unknown[0]!r}; there are "
+            f"{', '.join(CAMERAS)}"
+        )
     has_option = "embodiment" in dict(policy.hello.get("options", {}))
     for robot in sorted({key.embodiment for key in keys}):
         if spec.embodiments and robot not in spec.embodiments:

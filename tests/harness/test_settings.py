@@ -55,7 +55,7 @@ from robospa.tasks.task import Task
 from robospa.trial import TrialKey
 
 DEFAULTS = EvaluationSettings()
-OWN = {"more", "config", "resume", "token", "latency", "as_json", "help_all"}
+OWN = {"more", "config", "auto_resume", "resume", "token", "latency", "as_json", "help_all"}
 """Flags of `robospa eval` that are no settings."""
 
 
@@ -291,7 +291,7 @@ def test_unknown_tasks_are_refused(text: str) -> None:
 
 
 def test_levels() -> None:
-    assert parse_levels("1,3-5") == [1, 3, 4, 5]
+    assert parse_levels("1,3-5") == parse_levels("L1,L3-L5") == [1, 3, 4, 5]
 
 
 @pytest.mark.parametrize("text", ["0", "6", "", "2-1", "1-", "-1", "a", "1,,2", "1-99999999"])

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import asdict
 from pathlib import Path
 
 import pytest
+from command_line import robospa
 from fake_runs import trial_record
 
 from robospa.harness.cli.main import main
@@ -90,3 +92,19 @@ def test_every_failed_trial_with_its_evidence(
 
 def test_an_unknown_grouping_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "not by 'robot'" in printed(capsys, str(folder), "--by", "robot")
+
+
+def test_the_runs_of_a_folder_are_found(folder: Path) -> None:
+    shutil.copytree(folder, folder.parent / "runs" / "mine")
+    assert robospa("report", folder.parent / "runs").code == 0
+    assert (folder.parent / "runs" / "report" / "report.html").exists()
+
+
+def test_submit_with_a_run_packs_it_and_with_a_bundle_verifies_it(tmp_path: Path) -> None:
+    (tmp_path / "x.zip").write_bytes(b"none")
+    assert "--model" in robospa("submit", tmp_path).err
+    assert "x.zip" in robospa("submit", tmp_path / "x.zip").err
+
+
+def test_two_folders_for_a_data_set_are_refused(tmp_path: Path) -> None:
+    assert "two folders" in robospa("collect", tmp_path / "a", "--out", tmp_path / "b").err

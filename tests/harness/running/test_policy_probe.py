@@ -21,6 +21,7 @@ from robospa.harness.running.policy_probe import (
     warnings_of,
 )
 from robospa.harness.running.worker import WorkerConfig
+from robospa.observation import CameraSpec
 from robospa.protocol.server import ServerThread
 from robospa.results.lint import lint_run
 from robospa.results.records.manifest import RunError
@@ -65,6 +66,8 @@ def test_a_policy_for_another_robot() -> None:
     def probed(**spec: Any) -> ProbedPolicy:
         return ProbedPolicy("ws://a", replace(SPEC, **spec), {"options": {"embodiment": "x"}})
 
+    with pytest.raises(RunError, match="camera 'wrist_left'; there are head, left_wrist"):
+        check_fit(probed(cameras=(CameraSpec("wrist_left"),)), KEYS)
     with pytest.raises(RunError, match=r"drives franka, not aloha-agilex; .*\?embodiment=aloha"):
         check_fit(probed(embodiments=("franka",)), KEYS)
     franka = [replace(key, embodiment="franka-panda") for key in KEYS]
