@@ -107,6 +107,12 @@ class PolicyCaller:
     ) -> NDArray[np.float32]:
         """The policy's next actions, float32 (T, D), quantised as they are executed; `committed`
         is sent along with the observation."""
+        return run.checked(self.next_answer(run, spec, committed), spec)
+
+    def next_answer(
+        self, run: TrialState, spec: PolicySpec, committed: Committed | None = None
+    ) -> object:
+        """The same as the policy answers it."""
         observation = run.observation(spec)
         if committed is not None:
             observation["committed"], observation["delay"] = committed.actions, committed.delay
@@ -116,7 +122,7 @@ class PolicyCaller:
             self.server_timings.append(getattr(self.policy, "last_timing", {}))
         self.asked.append(observation["step"])
         self.latencies.append(1000.0 * run.stopwatch.last_call)
-        return run.checked(answer, spec)
+        return answer
 
     def usage(self) -> dict[str, object]:
         """What a record keeps of what the trial has used, as its policy says after each answer."""

@@ -31,7 +31,7 @@ from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.world import ActionError, StepResult, TellsInstruction, World
 from robospa.observation import Observation, View
 from robospa.protocol.errors import PolicyAnswerError, PolicyError
-from robospa.protocol.policy import Policy, PolicySpec, TrialInfo, check_chunk
+from robospa.protocol.policy import SKILL, Policy, PolicySpec, TrialInfo, check_chunk
 from robospa.results.records.action_problems import KINDS, ProblemKind
 from robospa.results.records.trial_record import (
     LEAD,
@@ -117,6 +117,8 @@ class TrialState:
     first_problems: dict[ProblemKind, str] = field(default_factory=dict)
     last_problems: tuple[str, ...] = ()
     """What of the last action was executed otherwise than sent."""
+    calls: list[dict[str, object]] = field(default_factory=list)
+    """Calls of skills so far, each with its feedback and the actions executed before it."""
     last_joints: NDArray[np.float32] | None = None
     """The joint action that was executed in the place of the last one, if that was of poses."""
 
@@ -186,6 +188,8 @@ class TrialState:
         observation = view.copy()
         observation["instruction"] = self.parts.instruction
         observation["step"] = step
+        if spec.action == SKILL:
+            observation["calls"] = [dict(call) for call in self.calls]
         if spec.history:
             self.past[step] = _images_and_state(view)
             observation["history"] = {
@@ -291,7 +295,13 @@ def _play(
         run.stopwatch.ask(answers.policy, answers.policy.reset, info)
         if run.start():
             return run.end, "the goal was decided before the first action"
-        return real.act(limit) if real is not None else _loop(run, answers, limit), ""
+        if real is not None:
+            return real.act(limit), ""
+        if answers.policy.spec.action == SKILL:
+            from robospa.harness.skill_calls import SkillTrial
+
+            return SkillTrial(run, answers, limit).act(), ""
+        return _loop(run, answers, limit), ""
     except (ActionError, PolicyError) as error:
         return "policy_error", str(error)
 
@@ -304,6 +314,8 @@ def _diagnostics(run: TrialState) -> dict[str, object]:
     task, scene = run.parts.task, run.parts.scene
     if task.lead is not None and scene.objects:  # a checkout tells none
         found[LEAD] = round(task.lead(scene), 5)
+    if run.calls:
+        found["calls"] = run.calls
     if run.events:
         found["objects"] = describe_objects(run.parts.scene)
     if run.grasps is not None:

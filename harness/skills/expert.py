@@ -99,10 +99,10 @@ class Expert:
                 ):
                     left.pop(0)
                     self.call = follow
-                    yield from self._move(call, follow)
+                    yield from self.move(call, follow)
                 else:
                     self.call = call
-                    yield from self._single(call)
+                    yield from self.perform(call)
             except SkillFailed as error:
                 self.failures.append(str(error))
         self.plan_done = True
@@ -110,7 +110,8 @@ class Expert:
         go_home(ws, [arm for arm in range(len(ARMS)) if ws.held[arm] is None])
         yield from ws.flush()
 
-    def _single(self, call: object) -> Steps:
+    def perform(self, call: object) -> Steps:
+        """The one call; raises SkillFailed."""
         ws = self.workspace
         skill = SKILLS.get(type(call))
         if skill is not None:
@@ -125,7 +126,7 @@ class Expert:
         else:
             raise SkillFailed(f"no skill performs {type(call).__name__}")
 
-    def _move(self, first: calls.Pick, then: calls.Place | calls.Drop) -> Steps:
+    def move(self, first: calls.Pick, then: calls.Place | calls.Drop) -> Steps:
         """Pick and place as one: done again while the object is not where it should be."""
         ws = self.workspace
         for left in reversed(range(MOVE_ATTEMPTS)):
@@ -139,7 +140,7 @@ class Expert:
                 if left == 0:
                     raise
                 continue
-            if self._arrived(then):
+            if self.arrived(then):
                 return
         if isinstance(then, calls.Place) and self._hangs(then):
             yield from slide_out(ws, arm, then.object, place_position(ws, then)[2])
@@ -149,7 +150,8 @@ class Expert:
         goal = place_position(self.workspace, call)
         return self.workspace.pose(call.object).position[2] - goal[2] >= STUCK_ABOVE
 
-    def _arrived(self, call: calls.Place | calls.Drop) -> bool:
+    def arrived(self, call: calls.Place | calls.Drop) -> bool:
+        """Whether the object is where the call puts it."""
         ws = self.workspace
         here = np.array(ws.pose(call.object).position)
         if isinstance(call, calls.Place):

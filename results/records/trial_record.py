@@ -25,6 +25,7 @@ USAGE = "usage"
 END_REASONS = (
     "success",
     "step_limit",
+    "done",  # a policy of skills said that it is done, and the goal is not met
     "time_limit",  # under a real clock: its simulated time is over
     "policy_error",  # the policy raised an error or answered what cannot be executed: a failure
     "goal_lost",  # the goal can no longer be met (memory tasks)
@@ -86,7 +87,8 @@ class TrialRecord:
     scene_digest: str
     """Hash of the scene at the start."""
     end: Annotated[str, one_of(END_REASONS)]
-    """`success`, `step_limit`, `time_limit`, `goal_lost`, `policy_error` or `infrastructure`."""
+    """`success`, `step_limit`, `done`, `time_limit`, `goal_lost`, `policy_error` or
+    `infrastructure`."""
     success: bool
     """Whether the goal was met."""
     done: Count

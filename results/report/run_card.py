@@ -19,6 +19,7 @@ from robospa.text import counted, some
 END_NAMES = {
     "success": "success",
     "step_limit": "step limit",
+    "done": "said done",
     "time_limit": "time limit",
     "policy_error": "policy error",
     "goal_lost": "goal lost",
