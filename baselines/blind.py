@@ -74,10 +74,10 @@ class BlindExpert(Expert):
     def _run(self, plan: Sequence[object]) -> Steps:
         scene = self.workspace.scene
         shown = max((item.appears_at or 0.0 for item in scene.objects), default=0.0)
-        yield from self._single(Wait(shown + SHOWN if shown else 0.0))
+        yield from self.perform(Wait(shown + SHOWN if shown else 0.0))
         yield from super()._run(self._planner(scene, self.workspace))
 
-    def _single(self, call: object) -> Steps:
+    def perform(self, call: object) -> Steps:
         name = getattr(call, "object", "")
         if name in self._hopeless:
             return
@@ -85,7 +85,7 @@ class BlindExpert(Expert):
             if isinstance(call, TryOut):
                 yield from call.steps(self.workspace)
             else:
-                yield from super()._single(call)
+                yield from super().perform(call)
         except SkillFailed:
             self._hopeless.add(name)
             raise

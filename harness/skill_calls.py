@@ -42,6 +42,7 @@ the first that is free."""
 GAP = 0.06
 """Room [m] between it and other things there."""
 DONE = "done"
+CUT = "the trial ended meanwhile"
 NOTHING, NOT_HELD, BUSY = "nothing there", "not held", "the hand is not free"
 NOT_POSSIBLE, NOT_THERE = "not possible with what is there", "let go, but not where it should be"
 REACH = "out of reach"
@@ -173,16 +174,15 @@ class SkillTrial:
             if first.call.skill == DONE:
                 self._keep(first, DONE)
                 return True
-            if first.call.skill == "pick" and left and left[0].call.skill in ("place", "drop"):
-                if left[0].call.arm in (None, first.call.arm):
-                    group.append(left.pop(0))
+            if first.call.skill == "pick" and left and _together(first.call, left[0].call):
+                group.append(left.pop(0))
             self._look()
-            before, step, held = len(self.run.actions), len(self.run.actions), list(self.ws.held)
+            before, held = len(self.run.actions), list(self.ws.held)
             for order in group:
-                self._keep(order, "", step)
+                self._keep(order, CUT)
             said = self._done(group)
-            for order, text in zip(self.run.calls[-len(group) :], said, strict=True):
-                order["feedback"] = text
+            for kept, text in zip(self.run.calls[-len(group) :], said, strict=True):
+                kept["feedback"] = text
             for arm, name in enumerate(self.ws.held):
                 if name is not None and name != held[arm]:
                     self.latest = arm
@@ -191,9 +191,9 @@ class SkillTrial:
                     self._still()
         return False
 
-    def _keep(self, order: Order, feedback: str, step: int | None = None) -> None:
-        at = len(self.run.actions) if step is None else step
-        self.run.calls.append({**plain_call(order.call), "step": at, "feedback": feedback})
+    def _keep(self, order: Order, feedback: str) -> None:
+        step = len(self.run.actions)
+        self.run.calls.append({**plain_call(order.call), "step": step, "feedback": feedback})
 
     def _done(self, group: list[Order]) -> list[str]:
         """Perform a call, or a pick with the place or drop after it; the feedback of each."""
@@ -400,6 +400,11 @@ class SkillTrial:
                 self.run.remember(spec, len(self.run.actions))
             if self.run.execute(action, spec.executed):
                 raise TrialOver(self.run.end)
+
+
+def _together(take: Call, put: Call) -> bool:
+    """Whether the second call puts down or drops what the first one picks."""
+    return put.skill in ("place", "drop") and put.arm in (None, take.arm)
 
 
 def _pixel(point: Point, width: int, height: int) -> tuple[int, int]:

@@ -201,7 +201,7 @@ class ChangedExpert(Expert):
         super().__init__(scene, snapshot, plan)
         self._rng = rng
 
-    def _single(self, call: object) -> Steps:
+    def perform(self, call: object) -> Steps:
         ws = self.workspace
         if isinstance(call, GoWrong):
             self.went_wrong = True
@@ -211,7 +211,7 @@ class ChangedExpert(Expert):
             yield from call.steps(ws, self._rng)
             self.begun = True
         else:
-            yield from super()._single(call)
+            yield from super().perform(call)
 
 
 def free_side(scene: Scene, name: str) -> tuple[float, float]:
