@@ -1,0 +1,296 @@
+"""The ceiling of the action space "skill": the expert's plan said in calls, one answer for each.
+
+A policy that knows the plan and sees what every pixel shows finds a pixel of each object that the
+plan names, and says the call. What it solves is what skills can reach at all.
+
+    python tools/skill_ceiling.py OUT.jsonl --seeds 3 [--workers 2] [--tasks A,B]
+
+Seeds are of a range that no list of accepted ones uses; those that the expert itself does not solve
+do not count. A trial that is in OUT
+already is not run again. Prints every variant that is not always solved.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.baselines.oracle import Oracle
+from robospa.geometry import Vec3
+from robospa.harness.sim.sapien_world import SapienWorld
+from robospa.harness.trial import run_trial
+from robospa.harness.world import TABLE, SceneUnstable
+from robospa.observation import CameraSpec, Observation
+from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.results.records.trial_record import TrialRecord
+from robospa.tasks import plan
+from robospa.tasks.catalog import build_scene, task, tasks
+from robospa.tasks.objects import object_model
+from robospa.tasks.scene import Scene
+from robospa.tasks.shapes import ObjectModel
+from robospa.trial import TrialKey
+
+HEAD = CameraSpec("head", 640, 480)
+SPEC = PolicySpec("plan in calls", (HEAD,), "none", "skill", seeded=True, needs_trial_key=True)
+FIRST_SEED = 700_000
+Call = dict[str, object]
+
+
+class PlainWorld(SapienWorld):
+    """A world that draws no pictures for observations: nobody looks at them here."""
+
+    def observe(self, spec: PolicySpec) -> Observation:
+        return super().observe(replace(spec, cameras=()))
+
+
+class NotSeen(Exception):
+    """What a plan names is not in the picture."""
+
+
+class PlanInCalls:
+    """Says the plan of a trial in `world`, a call or a pick with its place at a time."""
+
+    spec = SPEC
+
+    def __init__(self, world: SapienWorld) -> None:
+        self.world = world
+        self.left: list[object] = []
+        self.note = ""
+
+    def reset(self, trial: TrialInfo) -> None:
+        key = trial.key
+        assert key is not None
+        self.scene = build_scene(key.task, key.level, key.seed, key.embodiment, key.mode)
+        self.left = list(task(key.task).plan(self.scene))
+        self.note = ""
+
+    def infer(self, observation: Observation) -> list[Call]:
+        if not self.left:
+            return [{"skill": "done"}]
+        call = self.left.pop(0)
+        group = [call]
+        while self.left and (
+            (isinstance(call, plan.Press) and self.left[0] == call)
+            or (isinstance(call, plan.Pick) and isinstance(self.left[0], plan.Place | plan.Drop))
+        ):
+            group.append(self.left.pop(0))
+            if not isinstance(call, plan.Press):
+                break
+        try:
+            picture = Picture(self.world, self.scene)
+            return [picture.said(one) for one in group]
+        except NotSeen as error:
+            self.note = str(error)
+            return [{"skill": "done"}]
+
+
+class Picture:
+    """What the head camera shows now, and where its pixels are."""
+
+    def __init__(self, world: SapienWorld, scene: Scene) -> None:
+        self.scene, self.now = scene, world.snapshot()
+        self.ids: NDArray[np.int16] = world.identify(HEAD)
+        self.view = world.view(HEAD)
+        self.names = [one.name for one in scene.everything]
+
+    def said(self, call: object) -> Call:
+        """`call` in points; raises NotSeen."""
+        name = {"RaiseLower": "raise_lower"}.get(type(call).__name__, type(call).__name__.lower())
+        found: Call = {"skill": name}
+        arm = getattr(call, "arm", None)
+        if arm is not None:
+            found["arm"] = arm
+        match call:
+            case plan.Home():
+                pass
+            case plan.Wait():
+                found["seconds"] = call.seconds
+            case plan.Place():
+                found |= self._place(call)
+            case plan.Drop():
+                found["at"] = self.point(call.into)
+            case plan.Hit():
+                found["at"] = self.point(call.tool)
+                found["to"] = [self.point(one) for one in call.targets]
+            case plan.Pour():
+                found["at"], found["to"] = self.point(call.object), self.point(call.into)
+            case plan.Stamp():
+                found["at"], found["to"] = self.point(call.object), self.point(call.on)
+                found["times"] = call.times
+            case plan.Dock() | plan.Hang():
+                found["at"], found["to"] = self.point(call.object), self.point(call.on)
+            case plan.RaiseLower():
+                found |= {"at": self.point(call.object), "times": call.times}
+                found |= {"arms": list(call.arms), "lift": call.rise}
+            case plan.Pick():
+                found |= {"at": self.point(call.object), "lift": call.lift}
+            case plan.Press() | plan.Open():
+                found["at"] = self.point(call.object)
+            case _:
+                raise NotSeen(f"no call says {call}")
+        return found
+
+    def point(self, name: str) -> list[float]:
+        """A point well within what is seen of an object."""
+        return self._inside(self.ids == self.names.index(name), name)
+
+    def _inside(self, shown: NDArray[np.bool_], name: str) -> list[float]:
+        rows, columns = np.nonzero(shown)
+        if not len(rows):
+            raise NotSeen(f"{name} is not seen")
+        away = (rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2
+        best = int(away.argmin())
+        height, width = self.ids.shape
+        return [(float(columns[best]) + 0.5) / width, (float(rows[best]) + 0.5) / height]
+
+    def _place(self, call: plan.Place) -> Call:
+        found: Call = {}
+        if call.yaw is not None:
+            w, _, _, z = self.now.poses[call.object].rotation
+            turn = math.degrees(call.yaw - 2 * math.atan2(z, w))
+            found["turn"] = (turn + 180) % 360 - 180
+        if call.drop != plan.Place.drop:
+            found["height"] = call.drop
+        model = self._model(call.object)
+        if call.on is not None:
+            found["at"] = self.point(call.on)
+            if any(call.position[:2]):
+                top = self._support(call.on)
+                found["offset"] = list(np.subtract(self._at(call), top)[:2])
+            return found
+        where = call.position
+        if where[2] + model.bottom - self.scene.table_top > 0.004:  # on a thing, off its middle
+            below = min(
+                (n for n in self.names if n != call.object and n in self.now.poses),
+                key=lambda n: math.dist(where[:2], self._support(n)[:2]),
+            )
+            offset = np.subtract(where, self._support(below))[:2]
+            return {**found, "at": self.point(below), "offset": offset.tolist()}
+        seen = self.view.pixel((where[0], where[1], self.scene.table_top))
+        height, width = self.ids.shape
+        if seen is not None and 0 <= seen[0] < 1 and 0 <= seen[1] < 1:
+            shown = self.ids[int(seen[1] * height), int(seen[0] * width)]
+            if shown == TABLE:
+                return {**found, "at": list(seen)}
+        return {**found, **self._beside(where)}
+
+    def _beside(self, where: Vec3) -> Call:
+        """The table's point seen nearest to one that is not, and the way from there."""
+        height, width = self.ids.shape
+        best: tuple[float, list[float], list[float]] | None = None
+        rows, columns = np.nonzero(self.ids[::4, ::4] == TABLE)
+        for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
+            u, v = (4 * column + 0.5) / width, (4 * row + 0.5) / height
+            spot = self.view.onto(u, v, self.scene.table_top)
+            if spot is not None:
+                off = [where[0] - spot[0], where[1] - spot[1]]
+                if best is None or math.hypot(*off) < best[0]:
+                    best = math.hypot(*off), [u, v], off
+        if best is None:
+            raise NotSeen("the table is not seen")
+        return {"at": best[1], "offset": best[2]}
+
+    def _model(self, name: str) -> ObjectModel:
+        item = self.scene.object(name)
+        return object_model(item.asset, item.params)
+
+    def _support(self, name: str) -> Vec3:
+        return (self.now.poses[name] * self._model(name).frames["support"]).position
+
+    def _at(self, call: plan.Place) -> Vec3:
+        assert call.on is not None
+        return (self.now.poses[call.on] * self._model(call.on).frames["support"]).apply(
+            call.position
+        )
+
+
+WORLD: list[PlainWorld] = []
+
+
+def solvable(key: TrialKey) -> bool:
+    """Whether the expert solves the trial, as it does those of accepted seeds."""
+    return run_trial(WORLD[0], Oracle(), key, policy_seed=0).success
+
+
+def run(name: str, level: int, seed: int) -> dict[str, object]:
+    """One trial as a row; a seed whose scene is not stable is told as such."""
+    if not WORLD:
+        WORLD.append(PlainWorld())
+    policy = PlanInCalls(WORLD[0])
+    row: dict[str, object] = {"task": name, "level": level, "seed": seed}
+    try:
+        record: TrialRecord = run_trial(
+            WORLD[0], policy, TrialKey(name, level, seed), policy_seed=0
+        )
+    except (SceneUnstable, ValueError) as error:
+        return {**row, "end": f"unstable: {error}"}
+    calls = record.diagnostics.get("calls", [])
+    wrong = [(one["skill"], one["feedback"]) for one in calls if one["feedback"] != "done"]
+    end = record.end
+    if end != "success" and not solvable(TrialKey(name, level, seed)):
+        end = "expert fails, too"
+    return {
+        **row,
+        "end": end,
+        "message": record.message,
+        "steps": record.steps,
+        "calls": len(calls),
+        "seconds": round(record.wall_time, 1),
+        "note": policy.note,
+        "failed": wrong,
+    }
+
+
+def table(rows: Sequence[dict[str, object]]) -> str:
+    """Solved trials by task and level, tasks that are always solved in one line."""
+    solved: dict[tuple[str, int], Counter[str]] = defaultdict(Counter)
+    for row in rows:
+        if str(row["end"]).split()[0] not in ("unstable:", "expert"):
+            solved[str(row["task"]), int(str(row["level"]))][str(row["end"])] += 1
+    whole = sum(sum(c.values()) for c in solved.values())
+    good = sum(c["success"] for c in solved.values())
+    full = sum(c["success"] == sum(c.values()) for c in solved.values())
+    lines = [f"{good} of {whole} trials solved ({100 * good / max(whole, 1):.2f} %)"]
+    lines.append(f"{full} of {len(solved)} variants solved in every trial; the others:")
+    for (name, level), ends in sorted(solved.items()):
+        if ends["success"] < sum(ends.values()):
+            lines.append(f"{name} {level}: {dict(ends)}")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--tasks", default="")
+    given = parser.parse_args()
+    text = given.out.read_text() if given.out.exists() else ""
+    rows = [json.loads(line) for line in text.splitlines()]
+    there = {(row["task"], row["level"], row["seed"]) for row in rows}
+    asked = [
+        (one.name, level, FIRST_SEED + n)
+        for n in range(given.seeds)
+        for one in tasks().values()
+        for level in one.levels
+        if not given.tasks or one.name in given.tasks.split(",")
+    ]
+    left = [key for key in asked if key not in there]
+    with ProcessPoolExecutor(given.workers) as pool, given.out.open("a") as out:
+        for job in as_completed([pool.submit(run, *key) for key in left]):
+            rows.append(job.result())
+            print(json.dumps(rows[-1]), file=out, flush=True)
+    print(table(rows))
+
+
+if __name__ == "__main__":
+    main()
