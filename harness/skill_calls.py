@@ -42,7 +42,7 @@ the first that is free."""
 GAP = 0.06
 """Room [m] between it and other things there."""
 DONE = "done"
-CUT = "the trial ended meanwhile"
+MET, CUT = "the goal was met", "the trial ended meanwhile"
 NOTHING, NOT_HELD, BUSY = "nothing there", "not held", "the hand is not free"
 NOT_POSSIBLE, NOT_THERE = "not possible with what is there", "let go, but not where it should be"
 REACH = "out of reach"
@@ -114,6 +114,8 @@ class SkillTrial:
                     self._still()
                     return "success" if self.run.end == "success" else DONE
         except TrialOver as over:
+            for call in self.run.calls if str(over) == "success" else ():
+                call["feedback"] = MET if call["feedback"] == CUT else call["feedback"]
             return str(over)
 
     # -- what the points mean ------------------------------------------------------------------
@@ -212,7 +214,10 @@ class SkillTrial:
         return [DONE]
 
     def _moved(self, first: Order, then: Order) -> list[str]:
-        take = self._planned(first)
+        try:
+            take = self._planned(first)
+        except SkillFailed as error:
+            return [_feedback(error), *self._done([then])]
         assert isinstance(take, plan.Pick)
         try:
             put = self._put(then, take.object)

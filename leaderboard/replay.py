@@ -146,7 +146,7 @@ def judge(claimed: TrialRecord, again: TrialRecord) -> Replayed:
     if "policy_error" in ends and claimed.end == again.end:
         # The refused action is not in the recording: one step less, with the same final state.
         differs = [name for name in differs if name not in ("steps", "actions_digest")]
-    elif claimed.end != again.end:
+    elif claimed.end != again.end and ends != ("done", "policy_error"):  # what said so is not there
         differs.append("end")
     far = _apart(claimed, again)
     kind = AGREES if set(differs) <= {"digest", "physics_steps"} else DIFFERENT
