@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from importlib.resources import files
@@ -36,14 +37,14 @@ from robospa.leaderboard.entries import (
 )
 from robospa.leaderboard.submission import left_out, read_submissions
 from robospa.leaderboard.verify import paired, results_of
-from robospa.results.failures.labels import KINDS, NAMES, SIMULATED_PER_FILM
+from robospa.results.failures.labels import NAMES, SIMULATED_PER_FILM
 from robospa.results.figures.draw import draw
-from robospa.results.figures.series import DrawnFigure, Series
+from robospa.results.figures.series import COLOURS, DrawnFigure, Series
 from robospa.results.paper.origin import DIFFERENCES, ORIGIN
 from robospa.results.paper.published import load
 from robospa.results.report.page import FIGURES, card, figure, own_version, render
 from robospa.results.report.tables import ReportTable, for_page, method_notes, report_tables
-from robospa.results.report.trials import put
+from robospa.results.report.trials import FailureCount, put
 from robospa.results.scoring.grounding import Grounding, table_of
 from robospa.results.scoring.models import ModelResults
 from robospa.trial import CATEGORIES, CATEGORY_NAMES, DIMENSIONS, METRIC_NAMES
@@ -191,7 +192,8 @@ def write_model(entry: Entry, folder: Path) -> None:
         for name in names:
             put(entry.submission.folder / name, folder / name)
     drawings = _figures(entry, folder / FIGURES)
-    failures = failure_rows(entry.failures)
+    counts = sum(map(Counter, entry.failures.values()), Counter[str]())
+    failures = [FailureCount(kind, NAMES[kind], [n]) for kind, n in counts.most_common()]
     sections = ["summary", "evidence", "tables", "figures"]
     sections += ["failures"] if failures else []
     sections += ["videos", "trials"] if films else []
@@ -210,6 +212,10 @@ def write_model(entry: Entry, folder: Path) -> None:
         note=" ".join(method_notes([entry.column])),
         figures=[figure(drawing, folder, FORMATS) for drawing in drawings],
         failures=failures,
+        names=[entry.name],
+        colours=COLOURS,
+        trials=[1],
+        most_failed=max(counts.values(), default=1),
         sections=sections,
         trials_title="Filmed trials",
         records_are="the videos lie beside this page",
@@ -241,17 +247,6 @@ def _tables(entry: Entry) -> list[ReportTable]:
 
 def _chosen(entry: Entry) -> Mapping[str, Grounding]:
     return entry.submission.grounding if entry.submission else {}
-
-
-def failure_rows(failures: Mapping[str, Mapping[str, int]]) -> list[dict[str, object]]:
-    """How often each type occurs over all tasks, most first."""
-    counts = {kind: sum(found.get(kind, 0) for found in failures.values()) for kind in KINDS}
-    total = sum(counts.values())
-    return [
-        {"name": NAMES[kind], "count": n, "share": f"{100 * n / total:.1f}"}
-        for kind, n in sorted(counts.items(), key=lambda pair: -pair[1])
-        if n
-    ]
 
 
 def _figures(entry: Entry, folder: Path) -> list[DrawnFigure]:
