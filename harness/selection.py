@@ -122,7 +122,7 @@ def list_trials(selection: Selection) -> list[TrialKey]:
         for split in splits_of(selection)
         for task in tasks
         for level in levels
-        for seed in first_seeds(seeds, task, level, selection.trials)
+        for seed in first_seeds(seeds, task, level, selection.trials, selection.seeds is not None)
     ]
 
 
@@ -241,10 +241,11 @@ def canonical_mode(name: str) -> str:
         raise SettingsError(str(error)) from error
 
 
-def first_seeds(seeds: Seeds, task: str, level: int, count: int) -> Sequence[int]:
-    """The first `count` different seeds of a variant; raises SettingsError if it has fewer."""
+def first_seeds(seeds: Seeds, task: str, level: int, count: int, named: bool) -> Sequence[int]:
+    """The first `count` different seeds of a variant; raises SettingsError if it has fewer, unless
+    they were `named` and `count` was not."""
     found = list(dict.fromkeys(seeds(task, level)))
-    if len(found) < count:
+    if len(found) < count and not (named and found and count == Selection().trials):
         raise SettingsError(
             f"{task} level {level} has {len(found)} seeds, not {count}; "
             "choose fewer trials or name more seeds"

@@ -76,8 +76,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except Exception as error:
         if debug:
             raise
-        print(f"robospa: {sentence(error)}", file=sys.stderr)
-        sys.exit(1)
+        print(f"robospa: {misused(error) or sentence(error)}", file=sys.stderr)
+        sys.exit(getattr(error, "exit_code", 1))
 
 
 def _run(words: list[str]) -> None:
@@ -113,7 +113,8 @@ def _run(words: list[str]) -> None:
             app.add_typer(found, name=name)
         else:
             app.command(name, cls=SectionedCommand, context_settings=CONTEXT)(found)
-    typer.main.get_command(app).main(words, prog_name="robospa")
+    command = typer.main.get_command(app)
+    sys.exit(command.main(words, prog_name="robospa", standalone_mode=False) or 0)
 
 
 def command_of(name: str) -> Any:
@@ -130,6 +131,14 @@ def completed_line(environment: Mapping[str, str]) -> list[str]:
 
 def _unloaded() -> None:
     """Stands for a subcommand that was not chosen."""
+
+
+def misused(error: Exception) -> str:
+    """What is wrong with the words of a command line, and where its help is; "" for others."""
+    text = getattr(error, "format_message", str)()
+    context = getattr(error, "ctx", None)
+    where = "" if context is None else f"; see {context.command_path} --help"
+    return text and text[0].lower() + " ".join(text[1:].split()).rstrip(".") + where
 
 
 def sentence(error: BaseException) -> str:

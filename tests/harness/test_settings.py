@@ -321,6 +321,7 @@ def test_the_first_seeds_of_every_variant() -> None:
         ("Pick_Blocks_Size", 1, 7), ("Pick_Blocks_Size", 1, 8), ("Pick_Blocks_Size", 2, 7)
     ]  # fmt: skip
     assert len(keys) == 8
+    assert len(list_trials(Selection(tasks, "1,2", seeds="7-9"))) == 12
     assert {(k.embodiment, k.mode, k.split) for k in keys} == {("aloha-agilex", "clean", "train")}
 
 
