@@ -7,15 +7,44 @@ Spatial and basic tasks alone: they ask for one object, and the head camera show
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.protocol.calls import plain_call, read_calls
+from robospa.tasks.events import Event
 from robospa.tasks.task import Tracker
 
-REACH = 1 / 64
-"""How far beside an object a point may be and still mean it, in widths of the picture: 5 px of 320,
-as much as a drawn edge is in doubt."""
+if TYPE_CHECKING:
+    from robospa.harness.policy_calls import PolicyCaller
+    from robospa.harness.trial import TrialState
+
+RADIUS = 0.02
+"""How far beside an object a point may be and still mean it, as a share of the picture's width:
+6 px of 320."""
+
+
+def answer_question(run: TrialState, answers: PolicyCaller) -> str:
+    """Ask the policy of the scene that is loaded, and note what it points at; the end reason.
+
+    What it points at is noted as an object that was taken, so that choices are counted as of other
+    trials.
+    """
+    spec = answers.policy.spec
+    call, *_ = read_calls(answers.next_answer(run, spec), spec)
+    camera = next(c for c in spec.cameras if c.name == call.camera)
+    shown = run.stopwatch.call("rendering", run.world.identify, camera)
+    found = meant(shown, call.at or (0.0, 0.0))
+    name = run.parts.scene.everything[found].name if found >= 0 else ""
+    right = name == asked_for(run.parts.tracker)
+    feedback = "done" if right else "another object" if name else "nothing there"
+    run.calls.append({**plain_call(call), "step": 0, "feedback": feedback})
+    if right:
+        run.note((Event(0.0, "subtask_done", name, 0), Event(0.0, "success")))
+    elif name:
+        run.note((Event(0.0, "wrong_object", name),))
+    return "success" if right else "done"
 
 
 def asked_for(tracker: Tracker) -> str:
@@ -25,7 +54,7 @@ def asked_for(tracker: Tracker) -> str:
 
 def meant(shown: NDArray[np.int16], at: Sequence[float]) -> int:
     """What the point [u, v] in a picture is on, as `World.identify` numbers it: the object there,
-    else the nearest one within REACH, else what is there."""
+    else the nearest one within RADIUS, else what is there."""
     height, width = shown.shape
     column, row = at[0] * width, at[1] * height
     here = int(shown[min(int(row), height - 1), min(int(column), width - 1)])
@@ -33,7 +62,7 @@ def meant(shown: NDArray[np.int16], at: Sequence[float]) -> int:
         return here
     rows, columns = np.nonzero(shown >= 0)
     far = np.hypot(columns + 0.5 - column, rows + 0.5 - row)
-    if not len(far) or far.min() > REACH * width:
+    if not len(far) or far.min() > RADIUS * width:
         return here
     nearest = far.argmin()
     return int(shown[rows[nearest], columns[nearest]])

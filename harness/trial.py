@@ -31,7 +31,15 @@ from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.world import ActionError, StepResult, TellsInstruction, World
 from robospa.observation import Observation, View
 from robospa.protocol.errors import PolicyAnswerError, PolicyError
-from robospa.protocol.policy import SKILL, Policy, PolicySpec, TrialInfo, check_chunk
+from robospa.protocol.policy import (
+    CALLED,
+    POINT,
+    SKILL,
+    Policy,
+    PolicySpec,
+    TrialInfo,
+    check_chunk,
+)
 from robospa.results.records.action_problems import KINDS, ProblemKind
 from robospa.results.records.trial_record import (
     LEAD,
@@ -118,7 +126,7 @@ class TrialState:
     last_problems: tuple[str, ...] = ()
     """What of the last action was executed otherwise than sent."""
     calls: list[dict[str, object]] = field(default_factory=list)
-    """Calls of skills so far, each with its feedback and the actions executed before it."""
+    """Calls so far, each with its feedback and the actions executed before it."""
     last_joints: NDArray[np.float32] | None = None
     """The joint action that was executed in the place of the last one, if that was of poses."""
 
@@ -188,7 +196,7 @@ class TrialState:
         observation = view.copy()
         observation["instruction"] = self.parts.instruction
         observation["step"] = step
-        if spec.action == SKILL:
+        if spec.action in CALLED:
             observation["calls"] = [dict(call) for call in self.calls]
         if spec.history:
             self.past[step] = _images_and_state(view)
@@ -297,6 +305,10 @@ def _play(
             return run.end, "the goal was decided before the first action"
         if real is not None:
             return real.act(limit), ""
+        if answers.policy.spec.action == POINT:
+            from robospa.harness.pointing import answer_question
+
+            return answer_question(run, answers), ""
         if answers.policy.spec.action == SKILL:
             from robospa.harness.skill_calls import SkillTrial
 

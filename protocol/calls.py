@@ -20,7 +20,7 @@ from msgspec import Meta, Struct
 from robospa.action_space import ARMS
 from robospa.observation import CAMERAS
 from robospa.protocol.errors import PolicyAnswerError, printable
-from robospa.protocol.policy import PolicySpec
+from robospa.protocol.policy import POINT, PolicySpec
 from robospa.schema import one_of, read
 
 MAX_CALLS = 64
@@ -78,8 +78,10 @@ FIELDS: Mapping[str, tuple[str, str]] = {
     "wait": ("seconds", ""),
     "home": ("", "arm"),
     "done": ("", ""),
+    "point": ("at", "camera"),
 }
-"""Fields that a skill needs, and those that it takes."""
+"""Fields that a skill needs, and those that it takes. A policy of the space "point" answers `point`
+alone, which no other one answers."""
 
 
 def read_calls(answer: object, spec: PolicySpec) -> list[Call]:
@@ -111,10 +113,11 @@ def plain_call(call: Call) -> dict[str, object]:
 
 def _read(value: object, what: str, spec: PolicySpec) -> Call:
     skill = value.get("skill") if isinstance(value, Mapping) else None
-    if not isinstance(value, Mapping) or not isinstance(skill, str) or skill not in FIELDS:
+    known = [name for name in FIELDS if (name == POINT) == (spec.action == POINT)]
+    if not isinstance(value, Mapping) or not isinstance(skill, str) or skill not in known:
         said = value if skill is None else skill
         raise PolicyAnswerError(
-            f"{what} must be a map whose 'skill' is one of {', '.join(FIELDS)}, "
+            f"{what} must be a map whose 'skill' is one of {', '.join(known)}, "
             f"not {printable(repr(said), 80)}"
         )
     what = f"{what} ({skill})"

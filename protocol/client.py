@@ -26,7 +26,7 @@ from robospa.protocol import errors, messages
 from robospa.protocol.calls import check_calls
 from robospa.protocol.codec import DEFAULT_LIMITS, Limits, encode_images
 from robospa.protocol.policy import (
-    SKILL,
+    CALLED,
     PolicyAnswer,
     PolicySpec,
     TrialInfo,
@@ -238,7 +238,7 @@ class RemotePolicy:
         round_trip = (time.perf_counter() - start) * 1e3
         self.last_timing = {**_finite(timing), "round_trip_ms": round_trip}
         self._warm = True
-        if self.spec.action == SKILL:
+        if self.spec.action in CALLED:
             return check_calls(answer, self.spec)
         options = self.hello.get("options")
         names = options if isinstance(options, Mapping) else ()
@@ -332,7 +332,7 @@ class _RobospaClient:
         self, id: int, observation: Observation, timeout: float
     ) -> tuple[object, Mapping[str, float]]:
         request = messages.Infer(id, observation)
-        if self.spec.action == SKILL:
+        if self.spec.action in CALLED:
             said = self._call(request, messages.Calls, timeout)
             return said.calls, said.timing
         actions = self._call(request, messages.Actions, timeout)

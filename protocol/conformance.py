@@ -36,7 +36,7 @@ from robospa.protocol.messages import (
     unpack,
 )
 from robospa.protocol.policy import (
-    SKILL,
+    CALLED,
     PolicyAnswer,
     PolicySpec,
     TrialInfo,
@@ -80,7 +80,7 @@ def synthetic_observation(spec: PolicySpec, step: int = 0, seed: int = 0) -> Obs
     observation["instruction"], observation["step"] = TRIAL.instruction, step
     if spec.history:
         observation["history"] = {offset: view() for offset in spec.history}
-    if spec.action == SKILL:
+    if spec.action in CALLED:
         observation["calls"] = []
     if spec.privileged:
         observation["privileged"] = {}
@@ -208,7 +208,7 @@ def _spec(target: _Target) -> str:
             f"the dialect {target.dialect} has no spec: the one chosen at this side is used"
         )
     cameras = ", ".join(f"{c.name} {c.width}x{c.height}" for c in spec.cameras) or "none"
-    if spec.action == SKILL:
+    if spec.action in CALLED:
         return f"{spec.name}: calls of skills, cameras {cameras}"
     length = "any length" if spec.horizon is None else f"at most {spec.horizon}"
     return f"{spec.name}: {spec.action} actions, chunks of {length}, cameras {cameras}"

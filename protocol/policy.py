@@ -24,8 +24,10 @@ from robospa.schema import Identifier, SettingName, describe, one_of, read
 from robospa.trial import REFERENCE, TrialKey
 
 CODECS = ("raw", "jpeg")
-SKILL = "skill"
-"""The space of policies that answer calls of skills (`robospa.protocol.calls`), not chunks."""
+SKILL, POINT = "skill", "point"
+CALLED = (SKILL, POINT)
+"""The spaces of policies that answer calls (`robospa.protocol.calls`) and no chunks: of skills, or,
+where nothing is moved, the point of the object that is asked for."""
 PolicyAnswer = NDArray[np.float32] | list[dict[str, object]]
 """A chunk of actions, float32 (T, D), or calls of skills."""
 JOINT_DIMS = tuple(
@@ -55,9 +57,10 @@ class PolicySpec:
     """The images that are rendered and sent; head and both wrists at 320x240 by default."""
     state: Annotated[str, one_of(STATES)] = "commanded"
     """Joints as `commanded` (the official convention), as `measured`, or `none`."""
-    action: Annotated[str, one_of((*KINDS, SKILL))] = "joint"
+    action: Annotated[str, one_of((*KINDS, *CALLED))] = "joint"
     """Space of the actions: `joint` (absolute targets, laid out as the observation's `state`), `ee`
-    (per arm x y z [m], qw qx qy qz, gripper), `delta_ee`, or `skill`: calls of skills."""
+    (per arm x y z [m], qw qx qy qz, gripper), `delta_ee`, or calls: of skills (`skill`), or of a
+    point in a picture (`point`)."""
     horizon: Annotated[int, Meta(ge=1, le=MAX_HORIZON)] | None = None
     """The most actions that a chunk may hold; None if it is not declared: up to 10,000."""
     execute: Annotated[int, Meta(ge=1)] | None = None
@@ -111,7 +114,7 @@ class PolicySpec:
     @property
     def executed(self) -> str:
         """Space of the actions that are executed and recorded: skills move joints."""
-        return "joint" if self.action == SKILL else self.action
+        return "joint" if self.action in CALLED else self.action
 
     @property
     def action_dims(self) -> tuple[int, ...]:
@@ -346,7 +349,7 @@ def check_observation(observation: Mapping[str, object], spec: PolicySpec) -> Ob
         if not isinstance(objects, np.ndarray) or objects.ndim != 1 or objects.dtype != np.float32:
             raise DecodeError("observation: 'environment_state' must be float32 of one axis")
     calls = observation.get("calls")
-    if spec.action == SKILL and not (
+    if spec.action in CALLED and not (
         isinstance(calls, list) and all(isinstance(call, dict) for call in calls)
     ):
         raise DecodeError("observation: 'calls' must be a list of maps")

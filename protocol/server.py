@@ -49,7 +49,7 @@ from robospa.protocol.errors import (
 )
 from robospa.protocol.messages import SUBPROTOCOL, Error, Message
 from robospa.protocol.openpi import serve_openpi
-from robospa.protocol.policy import SKILL, Policy, PolicySpec, check_chunk, check_observation
+from robospa.protocol.policy import CALLED, Policy, PolicySpec, check_chunk, check_observation
 from robospa.protocol.policy_host import PolicyFactory, PolicyHost, PolicySession
 from robospa.protocol.transport import enlarge_buffers, keep_alive, keep_freed_memory
 
@@ -139,7 +139,7 @@ class ConnectionHandler:
             return Error(request.id, messages.BAD_OBSERVATION, str(error))
         try:
             answer, timing = await self.policy.infer(observation)
-            if self.spec.action == SKILL:
+            if self.spec.action in CALLED:
                 return messages.Calls(request.id, [*check_calls(answer, self.spec)], timing)
             return messages.Actions(request.id, check_chunk(answer, self.spec), timing)
         except PolicyAnswerError as error:

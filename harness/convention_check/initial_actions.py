@@ -21,7 +21,7 @@ from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.observation import Observation
 from robospa.protocol.conformance import synthetic_observation, trial_for
-from robospa.protocol.policy import SKILL, Policy, PolicySpec, robot_of
+from robospa.protocol.policy import CALLED, Policy, PolicySpec, robot_of
 
 POSTURES = 4
 JUMP = {"joint": 1.0, "ee": 0.3}
@@ -69,7 +69,7 @@ def hints(policy: Policy) -> tuple[list[str], str]:
     spec = policy.spec
     if spec.sees_state or not _is_installed(robot_of(spec)):
         return [], "not for this policy"
-    if spec.action == SKILL:
+    if spec.action in CALLED:
         return [], "not for calls of skills"
     if spec.action == "joint" and spec.state == "none":
         return [], "the policy is not shown its joints"

@@ -260,5 +260,5 @@ Made, with the same bytes from the same version, by
     questions = load_dataset("DIR", split="train")
 
 `pandas.read_parquet("DIR/data/test-Pick_Blocks_Size.parquet")` reads one file. A point is right if
-the mask is white there (`robospa eval` grants 5 px beside it where no other object is nearer).
+the mask is white there (`robospa eval` grants 6 px beside it where no other object is nearer).
 """

@@ -19,9 +19,10 @@ from robospa.harness.factory import is_url, open_policy
 from robospa.harness.robots import embodiment
 from robospa.observation import CAMERAS
 from robospa.protocol.client import Identity, identity_of
-from robospa.protocol.policy import SKILL, PolicySpec, has
+from robospa.protocol.policy import CALLED, POINT, PolicySpec, has
 from robospa.results.records.manifest import PolicySettings, RunError
 from robospa.schema import parse_json
+from robospa.tasks.catalog import task as find_task
 from robospa.text import some
 from robospa.trial import TrialKey
 
@@ -189,6 +190,12 @@ def check_fit(policy: ProbedPolicy, keys: Sequence[TrialKey]) -> None:
             f"the policy {spec.name!r} asks for the camera {unknown[0]!r}; there are "
             f"{', '.join(CAMERAS)}"
         )
+    asked = {key.task: find_task(key.task).dimension for key in keys if spec.action == POINT}
+    if task := next((name for name, kind in asked.items() if kind == "procedural"), ""):
+        raise RunError(
+            f"the policy {spec.name!r} answers a point, and {task} asks for more than that: choose "
+            "--tasks spatial,basic"
+        )
     has_option = "embodiment" in dict(policy.hello.get("options", {}))
     for robot in sorted({key.embodiment for key in keys}):
         if spec.embodiments and robot not in spec.embodiments:
@@ -225,7 +232,7 @@ def check_blind(policies: Iterable[ProbedPolicy]) -> None:
 def check_clock(clock: PolicyClock | None, specs: Iterable[PolicySpec]) -> None:
     """Raises RunError if a policy's chunks cannot follow each other as `clock` says."""
     for spec in specs:
-        if clock is not None and spec.action == SKILL:
+        if clock is not None and spec.action in CALLED:
             raise RunError(
                 f"the policy {spec.name!r} answers calls of skills, which take as long as they "
                 "take: leave out --clock"
