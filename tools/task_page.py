@@ -33,18 +33,24 @@ FLOORS = Path("benchmarks/results/floors.csv")
 EXPERT = "expert"
 COUNT = "trials"
 
-HEAD = """# Tasks
+HEAD = """<!-- Written by `python tools/task_page.py`: do not edit. -->
+# Tasks
 
-Written by `python tools/task_page.py`: do not edit. {bases} base tasks and {basics} basic ones,
-with five levels (pictures: {first} and {last}). *n* counts the objects that a guesser could pick,
-or kinds of things to handle, *T* subtasks (spatial and basic tasks: 1), *limit* actions (there:
-150): one value, each level's, or a range in equal steps.
-`robospa tasks NAME --level 3 --seed 100007` shows a scene.
+{bases} base tasks and {basics} basic ones, each at five levels; the pictures show levels {first}
+and {last}, and `robospa tasks NAME --level 3 --seed 100007` any other scene.
 
-Percentages are SR/SR@1, of procedures SR/SR@1/PS, of [policies that read no
-sentence](policies.md#floors) at levels 1, 3 and 5, and of [the learned reference](learned.md)
-({extents}); *doing nothing* is its PS. The expert has 100 everywhere{but}. Where a policy
-that reads none has 100, [the rule asks for none](fidelity.md#what-the-official-rule-allows).
+| | |
+|---|---|
+| n | objects that a guesser could pick, or kinds of things to handle |
+| T | subtasks; 1 in spatial and basic tasks |
+| limit | actions that a trial may take; 150 in spatial and basic tasks |
+| `a to b` | levels 1 to 5 in equal steps |
+| 100/17 | SR/SR@1 in percent, of procedures SR/SR@1/PS |
+
+The columns are [policies that read no sentence](policies.md#floors) at levels 1, 3 and 5, and
+[the learned reference](learned.md) ({extents}); *doing nothing* is its PS. The expert has 100
+everywhere{but}. Where a policy that reads no sentence has 100, [the official rule asks for
+none](fidelity.md#what-the-official-rule-allows).
 """
 
 Rates = Mapping[str, Mapping[str, str]]

@@ -180,6 +180,6 @@ def many_policy_errors(run: Run) -> str:
     if not whole.results or 2 * whole.policy_errors < whole.results:
         return ""
     return (
-        f"{whole.policy_errors} of {whole.results} trials ended in a policy error: these numbers "
-        "say more about the policy's server or its options than about the policy"
+        f"{whole.policy_errors} of {whole.results} trials ended in a policy error: check the "
+        "policy's server and its options"
     )
