@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import runpy
 import sys
@@ -31,8 +32,19 @@ def run(name: str, *words: str) -> None:
 
 
 def test_the_page_names_every_script_and_no_other() -> None:
-    named = re.findall(r"\]\((\w+\.py)\)", (EXAMPLES / "README.md").read_text())
-    assert sorted(named) == sorted(path.name for path in EXAMPLES.glob("*.py"))
+    named = re.findall(r"\]\((\w+\.(?:py|ipynb))\)", (EXAMPLES / "README.md").read_text())
+    assert sorted(named) == sorted(p.name for p in EXAMPLES.glob("*.*") if p.suffix != ".md")
+
+
+@pytest.mark.sim
+def test_the_cells_of_the_notebook_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    cells = json.loads((EXAMPLES / "first_evaluation.ipynb").read_text())["cells"]
+    names: dict[str, object] = {}
+    for cell in cells:
+        if cell["cell_type"] == "code":
+            exec(cell["source"], names)  # in this process, as a kernel does it
+    assert len(names["run"].keys) == len(names["expert"].keys) == 6
 
 
 @pytest.mark.sim
