@@ -19,8 +19,6 @@ from matplotlib.axes import Axes
 
 WIDTH, LETTERS = 3.4, 44
 """Of a picture [inches], and how many letters of text fit below it."""
-MARKS = {"at": "o", "to": "x"}
-COLOURS = ("tab:red", "tab:blue", "tab:green", "tab:orange", "tab:purple")
 
 
 def answered(path: Path) -> list[dict[str, object]]:
@@ -39,11 +37,14 @@ def draw(axes: Axes, path: Path, line: dict[str, object], feedback: dict[int, st
     text = str(line["answer"])
     calls = json.loads(text[text.rindex('{"note"') :])["calls"]
     rows = []
-    for number, (call, colour) in enumerate(zip(calls, COLOURS * 9, strict=False)):
-        for name, mark in MARKS.items():
-            if name in call:
-                u, v = call[name]
-                axes.plot(u * width, v * height, mark, ms=9, mew=2, mec=colour, mfc="none")
+    for number, call in enumerate(calls):
+        for name in {"at", "to"} & call.keys():
+            u, v = call[name]
+            axes.plot(u * width, v * height, "o", ms=9, mew=3, mec="black", mfc="none")
+            axes.plot(u * width, v * height, "o", ms=9, mew=1.5, mec="white", mfc="none")
+            side, away = ("left", 16) if number % 2 and u < 0.8 else ("right", -16)
+            name = f"{first + number + 1} {call['skill']}"
+            axes.text(u * width + away, v * height, name, ha=side, weight="bold", fontsize=8)
         said = ", ".join(f"{key} {value}" for key, value in call.items() if key != "skill")
         came = feedback.get(first + number, "the trial ends")
         rows += textwrap.wrap(f"{first + number + 1}. {call['skill']} {said}: {came}", LETTERS)
@@ -57,11 +58,11 @@ def main(source: str, out: str) -> None:
     texts = "\n".join(map(str, lines[-1]["question"]))  # type: ignore[call-overload]
     known = [row.partition(". ")[2] for row in texts.splitlines() if row[:1].isdigit()]
     feedback = {n: str(json.loads(row)["feedback"]) for n, row in enumerate(known)}
-    figure, grid = pyplot.subplots(1, len(lines), figsize=(WIDTH * len(lines), WIDTH))
+    figure, grid = pyplot.subplots(1, len(lines), figsize=(WIDTH * len(lines), 0.92 * WIDTH))
     for axes, line in zip([grid] if len(lines) == 1 else grid, lines, strict=True):
         draw(axes, path, line, feedback)
     figure.suptitle(str(lines[0]["question"][0]), x=0.01, ha="left", fontsize=10)  # type: ignore[index]
-    figure.subplots_adjust(0.01, 0.25, 0.99, 0.92, 0.03)
+    figure.subplots_adjust(0.01, 0.13, 0.99, 0.93, 0.03)
     figure.savefig(out, dpi=110)
 
 

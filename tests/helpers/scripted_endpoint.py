@@ -7,6 +7,7 @@ import base64
 import io
 import json
 import random
+import re
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -163,8 +164,8 @@ def coloured(picture: NDArray[np.uint8], colour: str) -> list[float]:
 
 def by_colour(shown: Shown) -> list[dict[str, Any]]:
     """Picks up what has the sentence's first colour; of several it stacks one on the other."""
-    found = sorted((shown.sentence.find(name), name) for name in HUES if name in shown.sentence)
-    names = [name for _, name in found]
+    names = [word for word in re.findall(r"\w+", shown.sentence) if word in HUES]
+    names = list(dict.fromkeys(names))
     if len(names) < 2:
         return [{"skill": "pick", "at": coloured(shown.picture, names[0])}]
     placed = sum(text.count('"place"') for text in shown.texts)
