@@ -13,14 +13,14 @@ can use. The key comes from the environment; it is in no text that leaves this m
 from __future__ import annotations
 
 import json
-import math
 import os
+import re
 import threading
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
-from email.utils import parsedate_to_datetime
+from dataclasses import dataclass, field
 from types import ModuleType
+from typing import NamedTuple
 
 import msgspec
 
@@ -56,29 +56,8 @@ class BadAnswer(Exception):
     """The model answered what is no list of calls: one sentence."""
 
 
-@dataclass
-class Usage:
-    """What a trial has used: whole numbers but for `cost` and `seconds`."""
-
-    requests: int = 0
-    """Answers of the endpoint."""
-    repairs: int = 0
-    """Of these, answers that were no list of calls."""
-    unanswered: int = 0
-    """Requests that the endpoint did not answer; nobody knows whether they are paid for."""
-    input_tokens: int = 0
-    output_tokens: int = 0
-    cost: float = 0.0
-    """At the prices of the options [their currency]."""
-    seconds: float = 0.0
-    """That the answers took [s]; waits for an endpoint that is away are not in it."""
-    exhausted: int = 0
-    """1 if the trial ended because one of its bounds was reached."""
-
-    def add(self, more: Usage) -> None:
-        """Count `more` as well."""
-        for name, value in asdict(more).items():
-            setattr(self, name, getattr(self, name) + value)
+Usage = dict[str, float]
+"""What has been used, by the names of `protocol.policy.USAGE`."""
 
 
 @dataclass(frozen=True)
@@ -105,46 +84,16 @@ class EndpointOptions:
     price_in: float = option(0.0, "price of a million input tokens")
     price_out: float = option(0.0, "price of a million output tokens")
 
-    def price(self, tokens_in: int, tokens_out: int) -> float:
+    def price(self, tokens_in: float, tokens_out: float) -> float:
         """Of so many tokens."""
         return (tokens_in * self.price_in + tokens_out * self.price_out) / 1e6
 
 
-@dataclass(frozen=True)
-class ChatAnswer:
+class ChatAnswer(NamedTuple):
     """What the model said: `text`, and the arguments of its tool calls as JSON texts."""
 
     text: str
-    tools: tuple[str, ...] = ()
-
-
-class _Function(msgspec.Struct):
-    arguments: object = ""
-
-
-class _Tool(msgspec.Struct):
-    function: _Function
-
-
-class _Message(msgspec.Struct):
-    content: object = None
-    refusal: str | None = None
-    tool_calls: list[_Tool] | None = None
-
-
-class _Choice(msgspec.Struct):
-    message: _Message
-    finish_reason: str | None = None
-
-
-class _Tokens(msgspec.Struct):
-    prompt_tokens: int | None = 0
-    completion_tokens: int | None = 0
-
-
-class _Completion(msgspec.Struct):
-    choices: list[_Choice]
-    usage: _Tokens | None = None
+    tools: tuple[str, ...]
 
 
 @dataclass
@@ -167,7 +116,10 @@ class ChatEndpoint:
                 f"the endpoint's URL holds a secret: put it into the variable {given.key}"
             )
         self._key = os.environ.get(given.key, "")
-        self._extra = _extra(given.extra or "{}")
+        try:
+            self._extra = msgspec.json.decode(given.extra or "{}", type=dict[str, object])
+        except msgspec.DecodeError as error:
+            raise EndpointError(f"option extra is no JSON object: {error}") from None
         self._openai: ModuleType = need("openai")
         self._client = self._openai.OpenAI(
             base_url=given.endpoint, api_key=self._key or "none", max_retries=0
@@ -194,7 +146,7 @@ class ChatEndpoint:
             )
 
     def ask(self, body: Mapping[str, object], until: float, used: Usage) -> ChatAnswer:
-        """The answer to a request, and in `used` (empty) what it cost. Raises BadAnswer; Away at
+        """The answer to a request, and in `used` (all 0) what it cost. Raises BadAnswer; Away at
         `until`, on the monotonic clock, if there is none."""
         pause = FIRST_PAUSE
         while True:
@@ -202,7 +154,7 @@ class ChatEndpoint:
             try:
                 return self._once(body, until, used)
             except Away as error:
-                used.unanswered += 1
+                used["unanswered"] += 1
                 now = time.monotonic()
                 with self._lock:
                     self._free = max(self._free, now + (error.after or pause))
@@ -225,65 +177,49 @@ class ChatEndpoint:
             raw = self._client.chat.completions.with_raw_response.create(
                 **body, **more, timeout=max(until - began, 0.01)
             )
-            found = msgspec.json.decode(raw.content, type=_Completion)
+            found = json.loads(raw.content)
+            choice, tokens = found["choices"][0], found.get("usage") or {}
+            used["input_tokens"] += max(0, int(tokens.get("prompt_tokens") or 0))
+            used["output_tokens"] += max(0, int(tokens.get("completion_tokens") or 0))
+            used["cost"] = given.price(used["input_tokens"], used["output_tokens"])
+            said = choice["message"]
+            tools = [one["function"]["arguments"] for one in said.get("tool_calls") or ()]
         except self._openai.APIStatusError as error:
             if error.status_code in REFUSED:
-                used.requests += 1
+                used["requests"] += 1
                 raise BadAnswer(self._said(error)) from None
             raise Away(self._said(error), _retry_after(error.response.headers)) from None
         except self._openai.OpenAIError as error:
             raise Away(self._said(error)) from None
-        except (msgspec.DecodeError, UnicodeDecodeError):
+        except (
+            ValueError,
+            LookupError,
+            TypeError,
+            AttributeError,
+            ArithmeticError,
+            RecursionError,
+        ):
             raise Away(f"{given.endpoint} answered something that is no completion") from None
-        used.requests += 1
-        used.seconds += time.monotonic() - began
-        if (tokens := found.usage) is not None:
-            used.input_tokens += max(0, tokens.prompt_tokens or 0)
-            used.output_tokens += max(0, tokens.completion_tokens or 0)
-            used.cost += given.price(used.input_tokens, used.output_tokens)
-        if not found.choices:
-            raise Away(f"{given.endpoint} answered a completion without a choice")
-        return _usable(found.choices[0], given.max_tokens)
+        used["requests"] += 1
+        used["seconds"] += time.monotonic() - began
+        if said.get("refusal") or choice.get("finish_reason") == "content_filter":
+            raise BadAnswer(f"the model refused: {printable(str(said.get('refusal')), 200)}")
+        if choice.get("finish_reason") == "length":
+            raise BadAnswer(f"cut off after {given.max_tokens} tokens: answer in fewer")
+        text = said["content"] if isinstance(said.get("content"), str) else ""
+        if not text.strip() and not tools:
+            raise BadAnswer("the model answered nothing")
+        texts = [one if isinstance(one, str) else json.dumps(one) for one in tools]
+        return ChatAnswer(text[:LONGEST_ANSWER], tuple(one[:LONGEST_ANSWER] for one in texts))
 
     def _said(self, error: Exception) -> str:
         """The error in one line that says where, without the key."""
-        cause = f" ({error.__cause__})" if error.__cause__ else ""
-        text = f"{self.options.endpoint}: {printable(f'{error}{cause}')}"
-        return text.replace(self._key, "***") if self._key else text
-
-
-def _usable(choice: _Choice, most: int) -> ChatAnswer:
-    """What `choice` says; raises BadAnswer for a refusal, nothing, and what was cut off."""
-    said = choice.message
-    if said.refusal or choice.finish_reason == "content_filter":
-        why = printable(said.refusal or "its filter", 200)
-        raise BadAnswer(f"the model refused to answer ({why})")
-    text = said.content[:LONGEST_ANSWER] if isinstance(said.content, str) else ""
-    given = [one.function.arguments for one in said.tool_calls or ()]
-    tools = [one if isinstance(one, str) else json.dumps(one) for one in given]
-    if choice.finish_reason == "length":
-        raise BadAnswer(f"the answer was cut off after {most} tokens: answer in fewer")
-    if not text.strip() and not tools:
-        raise BadAnswer("the model answered nothing")
-    return ChatAnswer(text, tuple(tool[:LONGEST_ANSWER] for tool in tools))
+        text = f"{error} ({error.__cause__})" if error.__cause__ else str(error)
+        text = text.replace(self._key, "***") if self._key else text
+        return f"{self.options.endpoint}: {printable(text)}"
 
 
 def _retry_after(headers: Mapping[str, str]) -> float:
-    """Seconds that an answer asks to wait; 0 if it does not say. Dates are read as well."""
+    """Seconds that an answer asks to wait; 0 if it does not say, or in another form."""
     text = headers.get("retry-after", "")
-    try:
-        seconds = float(text)
-    except ValueError:
-        try:
-            seconds = parsedate_to_datetime(text).timestamp() - time.time()
-        except (ValueError, TypeError, OverflowError):
-            return 0.0
-    return seconds if 0.0 < seconds < math.inf else 0.0
-
-
-def _extra(text: str) -> dict[str, object]:
-    """The JSON object in `text`; raises EndpointError."""
-    try:
-        return msgspec.json.decode(text, type=dict[str, object])
-    except msgspec.DecodeError as error:
-        raise EndpointError(f"option extra is no JSON object: {error}") from None
+    return float(text) if re.fullmatch(r"\d{1,7}(\.\d*)?", text) else 0.0

@@ -17,7 +17,7 @@ import json
 import logging
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from robospa.baselines.agent.endpoint import (
@@ -33,7 +33,7 @@ from robospa.observation import Observation
 from robospa.protocol.calls import FIELDS, check_calls
 from robospa.protocol.errors import DecodeError, PolicyAnswerError, printable
 from robospa.protocol.options import option
-from robospa.protocol.policy import SKILL, PolicySpec, TrialInfo
+from robospa.protocol.policy import SKILL, USAGE, PolicySpec, TrialInfo
 from robospa.schema import Count
 
 log = logging.getLogger("robospa.agent")
@@ -127,9 +127,9 @@ class Trial:
     notes: list[str] = field(default_factory=list)
     bad: list[str] = field(default_factory=list)
     """The answers to the present question that cannot be used, and why."""
-    used: Usage = field(default_factory=Usage)
+    used: Usage = field(default_factory=lambda: dict.fromkeys(USAGE, 0))
     """In this attempt."""
-    largest: int = 0
+    largest: float = 0
     """The most input tokens that a question has had."""
 
 
@@ -147,12 +147,12 @@ class Agent:
     def reset(self, trial: TrialInfo) -> None:
         """Forget the trial before."""
         self._trial = Trial(trial)
-        self._totals.setdefault(trial.id, Usage())
+        self._totals.setdefault(trial.id, dict.fromkeys(USAGE, 0))
 
     @property
     def last_timing(self) -> Mapping[str, float]:
         """What the trial has used, its earlier attempts included."""
-        return asdict(self._totals[self._trial.info.id]) if self._trial else {}
+        return {**self._totals[self._trial.info.id]} if self._trial else {}
 
     def infer(self, observation: Observation) -> list[dict[str, object]]:
         """The next calls. Raises PolicyAnswerError, and Away where the endpoint is."""
@@ -176,7 +176,7 @@ class Agent:
             trial.bad.clear()
             trial.notes.append(note)
             return calls
-        self._count(Usage(exhausted=1))
+        self._count({"exhausted": 1})
         return [{"skill": "done"}]
 
     def end(self, outcome: Mapping[str, object]) -> None:
@@ -188,7 +188,8 @@ class Agent:
         self, trial: Trial, made: Sequence[Call], until: float
     ) -> tuple[str, list[dict[str, object]]]:
         """Note and calls of one answer of the model; raises BadAnswer."""
-        given, used = self.options, Usage()
+        given = self.options
+        used: Usage = dict.fromkeys(USAGE, 0)
         said, wrong = "", ""
         parts = question(trial, made, given)
         try:
@@ -197,30 +198,30 @@ class Agent:
             return read_answer(answer, self.spec)
         except BadAnswer as error:
             wrong = str(error)
-            used.repairs += 1
+            used["repairs"] += 1
             trial.bad.append(f"{wrong}\nIt was: {printable(said, SHOWN) or '(nothing)'}")
             raise
         finally:
-            trial.largest = max(trial.largest, used.input_tokens)
+            trial.largest = max(trial.largest, used["input_tokens"])
             self._count(used)
-            if given.log is not None and used.requests:
+            if given.log is not None and used["requests"]:
                 asked = [part["text"] for part in parts if "text" in part]
                 line: Message = {"question": asked, "answer": said, "error": wrong}
-                note_down(given.log, trial, {**line, "usage": asdict(used)})
+                note_down(given.log, trial, {**line, "usage": used})
 
     def _count(self, used: Usage) -> None:
         assert self._trial is not None
-        self._trial.used.add(used)
-        self._totals[self._trial.info.id].add(used)
+        for sums in (self._trial.used, self._totals[self._trial.info.id]):
+            sums.update({name: sums[name] + value for name, value in used.items()})
 
     def _used_up(self, trial: Trial) -> bool:
         """Whether this attempt has had all that it may use; of money, whether another answer as
         long as allowed might be more."""
         given, used = self.options, trial.used
-        dearest = used.cost + given.price(trial.largest, given.max_tokens)
+        dearest = used["cost"] + given.price(trial.largest, given.max_tokens)
         return (
-            used.requests >= given.most_requests
-            or used.seconds >= given.most_seconds
+            used["requests"] >= given.most_requests
+            or used["seconds"] >= given.most_seconds
             or (given.most_cost > 0 and dearest > given.most_cost)
         )
 
