@@ -181,6 +181,5 @@ class AnyModelOptions(ChunkOptions):
     )
 
     def spec_of(self, name: str, **more: Any) -> PolicySpec:
-        """The same, with the space, state and text of these options."""
         known = {"action": self.space, "state": self.state, "text_budget": self.text_budget}
         return super().spec_of(name, action_dim=self.columns(self.space), **known, **more)

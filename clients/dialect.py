@@ -84,7 +84,6 @@ class Endpoint:
 
     @property
     def secure(self) -> bool:
-        """Whether the scheme asks for TLS."""
         return self.scheme == self.dialect.secure_scheme
 
     @property

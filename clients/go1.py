@@ -132,7 +132,6 @@ class Go1ServerOptions(Go1Conventions):
     code: str | None = option(None, "checkout of AgiBot-World, or set PYTHONPATH")
 
     def __post_init__(self) -> None:
-        """ValueError for options that cannot be."""
         super().__post_init__()
         if not self.checkpoint:
             raise ValueError("option checkpoint is needed: the folder of the fine-tuned model")
@@ -148,7 +147,6 @@ class Go1(model_policy.ModelPolicy):
         self.spec = options.spec_of("go1", seeded=True, checkpoint=checkpoint)
 
     def predict(self, queries: Sequence[model_policy.Query]) -> list[model_policy.Chunk]:
-        """One chunk (T, 14) of absolute joint targets per query."""
         chunks = []
         for query in queries:
             with model_policy.seeded_rows([query.seed]):

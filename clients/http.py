@@ -139,7 +139,6 @@ class JsonServer:
         return status, reason, data
 
     def close(self) -> None:
-        """Close; harmless when closed already."""
         self._connection.close()
 
     def _connect(self, wait: float) -> None:

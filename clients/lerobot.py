@@ -256,7 +256,6 @@ class LeRobot(ModelPolicy):
         return "joint" if joint and width == actions else _space(width, "state")
 
     def predict(self, queries: Sequence[Query]) -> list[Chunk]:
-        """One chunk per query, in the space of the spec."""
         try:
             return self._predict(queries)
         except NotByRow:

@@ -71,12 +71,10 @@ class ModelPolicy:
         return self.infer_batch([observation], [0])[0]
 
     def reset_session(self, session: int, trial: TrialInfo) -> None:
-        """A new trial on the connection `session`."""
         self.begin(trial)
         self._trials[session] = trial, {}
 
     def end_session(self, session: int) -> None:
-        """The connection is gone."""
         self._trials.pop(session, None)
 
     def infer_batch(

@@ -162,5 +162,4 @@ class MsgpackSocket:
         return violation(self.url, printable(reason))
 
     def close(self) -> None:
-        """Close; harmless when closed already."""
         self._transport.close()

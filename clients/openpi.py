@@ -129,7 +129,6 @@ class OpenPiClientOptions(ChunkOptions):
 
     @property
     def extra_fields(self) -> dict[str, object]:
-        """Option `extra` as a map."""
         try:
             extra = json.loads(self.extra)
         except (ValueError, RecursionError):
@@ -390,7 +389,6 @@ class OpenPi(ModelPolicy):
         )
 
     def predict(self, queries: Sequence[Query]) -> list[Chunk]:
-        """One chunk (T, 14) of absolute joint targets per query."""
         inputs = [_observation(query) for query in queries]
         noise = [self._noise(query.seed) for query in queries]
         if self.batches and len(queries) > 1:

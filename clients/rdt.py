@@ -185,7 +185,6 @@ class Rdt(ModelPolicy):
         self.embeddings.find(trial.instruction)
 
     def predict(self, queries: Sequence[Query]) -> list[Chunk]:
-        """One chunk (T, 14) of absolute joint targets per query."""
         return [self._one(query.observation, query.seed) for query in queries]
 
     def _one(self, observation: Observation, seed: int) -> Chunk:

@@ -144,7 +144,6 @@ class FramedJson:
         return value["res"]
 
     def close(self) -> None:
-        """Close; harmless when closed already."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None

@@ -179,7 +179,6 @@ class XvlaSession(HttpSession):
         return actions
 
     def body(self, observation: Observation) -> bytes:
-        """The JSON body of one request."""
         sent: dict[str, object] = {}
         for place, name in enumerate(self._options.views):
             image = observation["images"][name]
@@ -209,7 +208,6 @@ class XvlaSession(HttpSession):
         return poses_to_ee6d(np.asarray(poses), how.quaternions, how.rotation)
 
     def _last_command(self, observation: Observation) -> NDArray[np.float32] | None:
-        """The action executed just before this query, if proprioception is to be that."""
         if self._chunk is None or self._options.proprio == "measured":
             return None
         done = int(observation["step"]) - self._asked_at
@@ -254,7 +252,6 @@ class XvlaServerOptions(XvlaConventions):
     batch: Count = option(8, "observations in one call of the model, at most")
 
     def __post_init__(self) -> None:
-        """ValueError for options that cannot be."""
         super().__post_init__()
         if not self.checkpoint:
             raise ValueError("option checkpoint is needed: a folder or a hub name")

@@ -47,7 +47,6 @@ class Agreement:
 
     @property
     def p(self) -> float:
-        """Two-sided."""
         return min(1.0, 2 * min(self.lower, self.upper))
 
 

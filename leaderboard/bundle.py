@@ -292,7 +292,6 @@ class BundleArchive:
         return data
 
     def read_map(self, name: str) -> dict[str, object]:
-        """The JSON object in the file `name`."""
         return parse_map(self.read(name), name)
 
     def all_used(self) -> None:

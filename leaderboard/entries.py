@@ -51,7 +51,6 @@ class Group:
 
     @property
     def title(self) -> str:
-        """The group in words."""
         if self.of_paper:
             return f"Numbers printed in the paper: {self.embodiment}, {self.mode} scenes"
         track = "" if self.track == JOINTS else f"Track of {self.track}, "
@@ -165,7 +164,6 @@ class Entry:
 
     @property
     def badge(self) -> str:
-        """The strongest one."""
         return max(self.badges, key=list(BADGES).index)
 
 

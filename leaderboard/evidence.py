@@ -245,12 +245,10 @@ class Reproduction(Struct, frozen=True, kw_only=True, dict=True):
 
     @property
     def holds(self) -> bool:
-        """Whether nothing contradicts the claim."""
         return not self.contradictions
 
     @cached_property
     def contradictions(self) -> dict[str, float]:
-        """What contradicts the claim, with its p."""
         metrics = {m: {v: Counts(*four) for v, four in c.items()} for m, c in self.counts.items()}
         return contradictions(metrics, self.categories, self.alpha)
 

@@ -65,7 +65,6 @@ class Valid:
 
     @property
     def settings(self) -> RunSettings:
-        """Those of the run."""
         return self.run.manifest.settings
 
 

@@ -55,7 +55,6 @@ class Snapshot:
     hinges: Mapping[str, float] = field(default_factory=dict)
 
     def height(self, name: str) -> float:
-        """Height [m] of the origin of the object called `name`."""
         return self.poses[name].position[2]
 
     def heights(self, names: Iterable[str]) -> list[float | None]:
@@ -64,7 +63,6 @@ class Snapshot:
         return [poses[name].position[2] if name in poses else None for name in names]
 
     def position(self, name: str) -> Vec3:
-        """Position [m] of the origin of the object called `name`."""
         return self.poses[name].position
 
     def gripper_contacts(self, name: str) -> list[Contact]:

@@ -191,13 +191,11 @@ class Guess:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of the mistakes."""
         shown = (self.view.name,) if self.view is not None else ()
         return (*shown, *(part.name for part in self.parts))
 
     @property
     def label(self) -> str:
-        """The names in one line."""
         return " + ".join(self.names) or "as it is"
 
     @property

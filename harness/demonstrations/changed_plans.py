@@ -77,7 +77,6 @@ class ActBeside:
     by: tuple[float, float]
 
     def steps(self, ws: Workspace) -> Steps:
-        """One attempt at a place that is off."""
         name, seen = self.call.object, ws.snapshot
         x, y, z = seen.poses[name].position
         shifted = Pose((x + self.by[0], y + self.by[1], z), seen.poses[name].rotation)
@@ -123,7 +122,6 @@ class ReleaseAnywhere:
     object: str
 
     def steps(self, ws: Workspace) -> Steps:
-        """Open."""
         arm = arm_holding(ws, self.object)
         ws.add(arm, gripper=1.0)
         ws.add(arm)

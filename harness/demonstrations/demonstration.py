@@ -113,11 +113,9 @@ class DemonstrationRun(trial.TrialState):
         return False
 
     def has(self, kind: str) -> bool:
-        """True if an event of this kind has happened."""
         return any(event.kind == kind for event in self.events)
 
     def next(self, expert: Expert) -> Rows:
-        """The expert's next actions."""
         rows = expert.next(self.world.snapshot())
         if expert.call is not self.call:
             self.call = expert.call
@@ -128,12 +126,10 @@ class DemonstrationRun(trial.TrialState):
         return rows
 
     def act(self, rows: Rows) -> None:
-        """Execute joint actions."""
         for action in quantize(rows):
             self.execute(action, "joint")
 
     def ended(self, expert: Expert) -> Demonstration:
-        """What came of it."""
         if self.recorder is not None:
             self.recorder.ended(self.world)
         return Demonstration(

@@ -50,7 +50,6 @@ class Push:
         return found
 
     def scaled(self, by: float) -> Push:
-        """The same push, `by` times as strong."""
         return Push(self.progress, by * self.shift)
 
 

@@ -81,7 +81,6 @@ class FrameRecorder:
         """Physics step at which the last action ended."""
 
     def __len__(self) -> int:
-        """Frames until now."""
         return len(self.frames)
 
     @property
@@ -100,7 +99,6 @@ class FrameRecorder:
         self._keep(world, self._ended)
 
     def polled(self, world: World, time: float) -> None:
-        """Keep the frame if it is due."""
         if self.stride == KEYFRAMES:
             return
         step = round(time * RATE)

@@ -175,7 +175,6 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._opened().render(self._camera)
 
     def close(self) -> None:
-        """Free the simulator and the window."""
         if self._world is not None:
             self._world.close()
             self._world = None
@@ -238,7 +237,6 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._record = record_of(self._trial, self._key, end, message, seed, range(steps))
 
     def _info(self) -> Info:
-        """Progress, and the events since the last call."""
         trial = self._trial
         assert trial is not None
         reached = outcome(trial.events, trial.parts.tracker.total)
@@ -282,11 +280,9 @@ class _Watcher:
         self._env, self._next = env, 0.0
 
     def started(self, world: World) -> None:
-        """The scene is at rest."""
         self._env.render()
 
     def polled(self, world: World, time: float) -> None:
-        """Draw every FRAME_SECONDS of simulated time."""
         if time >= self._next:
             self._next = time + FRAME_SECONDS
             self._env.render()
@@ -314,7 +310,6 @@ class Window:
         self._pygame.event.pump()  # else the desktop calls the program dead
 
     def close(self) -> None:
-        """Close it."""
         self._pygame.display.quit()
 
 

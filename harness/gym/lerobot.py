@@ -53,7 +53,6 @@ class LeRobotEnv(gymnasium.Wrapper[Observation, Any, Observation, Any]):
 
     @property
     def task(self) -> str:
-        """The task's name."""
         return self._inner.key.task
 
     @property
@@ -74,7 +73,6 @@ class LeRobotEnv(gymnasium.Wrapper[Observation, Any, Observation, Any]):
         return _as_lerobot(observation), _with_success(info)
 
     def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, Info]:
-        """One action."""
         observation, reward, terminated, truncated, info = self._inner.step(action)
         return _as_lerobot(observation), reward, terminated, truncated, _with_success(info)
 
@@ -114,7 +112,6 @@ class RoboSPAConfig(EnvConfig):
     features_map: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Derive the features that the policy is checked against."""
         robot = robot_named(self.embodiment)
         if self.state == "none":
             raise SettingsError("LeRobot's policies read a state: commanded or measured")
@@ -138,7 +135,6 @@ class RoboSPAConfig(EnvConfig):
 
     @property
     def gym_kwargs(self) -> dict[str, Any]:
-        """Arguments of every `TaskEnv`."""
         return {
             "embodiment": self.embodiment,
             "mode": self.mode,

@@ -174,7 +174,6 @@ class RoboSPAEnv(BaseEnv):
         return {"success": success, "fail": torch.tensor([failed]), **counts}
 
     def close(self) -> None:
-        """Free the simulator."""
         self.task_env.close()
 
     # -- what BaseEnv's observations are made of ------------------------------------------------
@@ -209,7 +208,6 @@ class RoboSPAEnv(BaseEnv):
         return {name: {"rgb": image} for name, image in self._pictures.items()}
 
     def get_sensor_images(self) -> Tree:
-        """The observation's pictures."""
         return self._get_obs_sensor_data()
 
     # -- pictures -------------------------------------------------------------------------------
@@ -220,11 +218,9 @@ class RoboSPAEnv(BaseEnv):
         return None if picture is None else torch.from_numpy(picture)[None]
 
     def render_human(self) -> None:
-        """Draw the window, which moves by itself while actions are executed."""
         self.task_env.render()
 
     def render_all(self) -> torch.Tensor:
-        """The render camera's picture beside those of the observation."""
         return tile_images([self.render_rgb_array(), *self._pictures.values()])
 
     # -- what is told of a trial ----------------------------------------------------------------
@@ -235,7 +231,6 @@ class RoboSPAEnv(BaseEnv):
         return self.task_env.record
 
     def get_language_instruction(self) -> list[str]:
-        """The sentence of the trial, of one environment."""
         return [self.task_env.instruction]
 
     def get_state_dict(self) -> Tree:
@@ -255,12 +250,10 @@ class RoboSPAEnv(BaseEnv):
         return {"actors": actors, "articulations": {}}
 
     def set_state_dict(self, state: Tree, env_idx: object = None) -> None:
-        """There is none: NotImplementedError."""
         raise _no_states()
 
     @property
     def gpu_sim_enabled(self) -> bool:
-        """Never."""
         return False
 
     @property

@@ -101,12 +101,10 @@ class _CheckoutKind(WorldKind):
         return replace(selection, instructions=folder)
 
     def arguments(self, settings: EvaluationSettings) -> dict[str, object]:
-        """The folder and the options that the world names."""
         folder, options = parse_checkout(settings.simulation.world)
         return {"folder": str(folder), **plain_options(options)}
 
     def parts(self, settings: EvaluationSettings, keys: Sequence[TrialKey]) -> Parts:
-        """Scenes that only name what is made there."""
         return PARTS, {"episodes": episodes_of(keys)}
 
 
@@ -141,7 +139,6 @@ class CheckoutTracker:
         return self._changes(snapshot, _verdict(snapshot).flags)
 
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """Flags that went up or down, and success."""
         seen = _verdict(snapshot)
         events = self._changes(snapshot, seen.flags)
         if seen.success and not self._success:
@@ -150,7 +147,6 @@ class CheckoutTracker:
         return events
 
     def diagnostics(self) -> Mapping[str, object]:
-        """The flags as they were at the end."""
         return {"flags": list(self._flags)}
 
     def _changes(self, snapshot: Snapshot, flags: tuple[bool, ...]) -> tuple[Event, ...]:

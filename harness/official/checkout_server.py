@@ -135,13 +135,11 @@ class Session:
         return {"values": values, **self._state()}, {}
 
     def step(self, request: Mapping[str, Any], action: np.ndarray) -> Answer:
-        """Execute one action."""
         env, before = self._loaded(), self.steps
         env.take_action(np.asarray(action, dtype=np.float64), action_type=str(request["kind"]))
         return {**self._state(), "physics_steps": self.steps - before}, {}
 
     def observe(self, request: Mapping[str, Any]) -> Answer:
-        """The images asked for, as the checkout draws them."""
         found = self._loaded().get_obs()
         images = {}
         for camera in request["cameras"]:
@@ -218,7 +216,6 @@ class Session:
         }
 
     def _arguments(self, name: str, config: str, embodiment: list[Any]) -> dict[str, Any]:
-        """What the official evaluation passes to a task, from the checkout's own files."""
         arguments = self._yaml(config + ".yml")
         robots = self._yaml("_embodiment_config.yml")
         cameras = self._yaml("_camera_config.yml")

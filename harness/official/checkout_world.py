@@ -148,7 +148,6 @@ class CheckoutProcess:
         return f"signal {-code}" if code < 0 else f"exit code {code}"
 
     def close(self) -> None:
-        """End the process; may be called again."""
         self._process.kill()
         self._process.wait()
         for pipe in (self._process.stdin, self._process.stdout):
@@ -187,7 +186,6 @@ class CheckoutStill:
         return self.draw([camera])[0]
 
     def draw(self, cameras: Sequence[CameraSpec]) -> list[NDArray[np.uint8]]:
-        """Several images of it; raises RenderUnavailable."""
         if self._world.physics_steps != self._steps:
             raise RenderUnavailable("a checkout draws only the present: this instant is over")
         return list(self._world.pictures(cameras).values())
@@ -255,7 +253,6 @@ class CheckoutWorld:
         return StepResult(steps, poll(self.snapshot()))
 
     def observe(self, spec: PolicySpec) -> Observation:
-        """Images, commanded state and end-effector poses that `spec` asks for."""
         if spec.privileged or spec.environment_state or spec.state == "measured":
             raise RenderUnavailable(
                 "a checkout shows images and the commanded state: this policy wants more"
@@ -288,7 +285,6 @@ class CheckoutWorld:
         return {camera.name: found[camera.name] for camera in cameras}
 
     def render(self, camera: CameraSpec) -> NDArray[np.uint8]:
-        """One RGB image (height, width, 3) of this instant."""
         return self.pictures([camera])[camera.name]
 
     def identify(self, camera: CameraSpec) -> NDArray[np.int16]:
@@ -300,7 +296,6 @@ class CheckoutWorld:
         raise RenderUnavailable("a checkout does not tell where its cameras are")
 
     def still(self) -> CheckoutStill:
-        """This instant, to be drawn before the world goes on."""
         return CheckoutStill(self, self.physics_steps)
 
     def snapshot(self) -> CheckoutSnapshot:
@@ -321,7 +316,6 @@ class CheckoutWorld:
         )
 
     def contacts(self) -> tuple[Contact, ...]:
-        """None: the checkout does not tell."""
         return ()
 
     def digest(self) -> str:
@@ -330,13 +324,11 @@ class CheckoutWorld:
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     def info(self) -> Mapping[str, object]:
-        """Where the checkout is and what it stands on."""
         hello = self._process.hello
         return {"simulator": "RoboSPA checkout", "checkout": hello.get("checkout"),
                 "versions": hello.get("versions"), "config": self._config}  # fmt: skip
 
     def close(self) -> None:
-        """End the process."""
         self._process.close()
 
     def _loaded(self) -> Scene:

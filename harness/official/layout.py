@@ -69,17 +69,14 @@ class OfficialLayout:
 
     @property
     def suite(self) -> str:
-        """The suite of results."""
         return SUITE if self.packed else BUILTIN_SUITE
 
     def warnings(self, official_sentences: bool) -> list[str]:
-        """What a run's owner should know of it."""
         if self.packed and not official_sentences:
             return [OWN_SENTENCES]
         return [self.trouble] if self.trouble else []
 
     def manifest_settings(self) -> LayoutSettings:
-        """For a run's manifest."""
         names = [switch.name for switch in chosen(self.switches)]
         assets = NAME if self.packed else "builtin"
         return LayoutSettings(assets, self.digest, names)
@@ -174,7 +171,6 @@ class _OfficialKind(SapienKind):
         return settings.selection
 
     def arguments(self, settings: EvaluationSettings) -> dict[str, object]:
-        """Those of our own simulator, how scenes settle, and what robots look like."""
         simulation = settings.simulation
         start, _ = parse_official(simulation.world, simulation.assets is not None)
         found = {**super().arguments(settings), "settle": start.settle}
@@ -183,7 +179,6 @@ class _OfficialKind(SapienKind):
         return found
 
     def parts(self, settings: EvaluationSettings, keys: Sequence[TrialKey]) -> Parts:
-        """Scenes with official quirks and objects; sentences as for the suite."""
         simulation = settings.simulation
         _, arguments = super().parts(settings, keys)
         tasks = {key.task for key in keys}
@@ -193,7 +188,6 @@ class _OfficialKind(SapienKind):
         return PARTS, {**arguments, "layout": layout, "episodes": episodes_of(keys)}
 
     def layout(self, arguments: Mapping[str, object]) -> tuple[LayoutSettings | None, list[str]]:
-        """What objects and quirks there are, and what its owner should know of it."""
         layout = arguments["layout"]
         assert isinstance(layout, OfficialLayout)
         return layout.manifest_settings(), layout.warnings("sentences" in arguments)

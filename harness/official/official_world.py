@@ -35,7 +35,6 @@ class OfficialWorld(SapienWorld):
         self._settle = settle
 
     def load(self, scene: Scene, contacts: bool = False) -> None:
-        """As in `SapienWorld`, and the rest of the official 11 s after it."""
         super().load(scene, contacts)
         if self._settle == "official":
             _wait(self._loaded(), f"{scene.task} level {scene.level} seed {scene.seed}")
@@ -48,7 +47,6 @@ class OfficialWorld(SapienWorld):
         return seen
 
     def info(self) -> Mapping[str, object]:
-        """With how scenes settle."""
         return {**super().info(), "settle": self._settle}
 
 

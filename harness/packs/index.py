@@ -45,7 +45,6 @@ class Index:
 
     @property
     def runnable(self) -> int:
-        """Number of tasks that can run."""
         return len(official.needs()) - len(self.missing)
 
     def summary(self) -> str:

@@ -225,7 +225,6 @@ class _Inside:
     __getitem__ = get
 
     def namespaced(self, namespace: str) -> _Inside:
-        """The same from a folder below."""
         return _Inside(self._folder / namespace, self._inside)
 
     def keys(self) -> list[str]:

@@ -55,11 +55,9 @@ class OfficialPack:
         return self._made(asset, json.dumps(dict(params), sort_keys=True))
 
     def digest(self) -> str:
-        """Hash of names and sizes of all files that models are made of, and of their points."""
         return digest_of(self.archive)
 
     def faults(self, tasks: Collection[str]) -> dict[str, str]:
-        """For each of `tasks` that cannot run with the archive a sentence that says why."""
         return task_faults(self.archive, tasks)
 
     def clutter(self, scene: Scene) -> tuple[ClutterKind, ...]:

@@ -44,7 +44,6 @@ class Row:
 
     @property
     def key(self) -> ListKey:
-        """The list that it is about."""
         return ListKey(self.task, self.level, self.embodiment, self.mode)
 
 

@@ -72,7 +72,6 @@ class Search:
 
     @property
     def done(self) -> bool:
-        """Whether nothing is left to try."""
         return not self.running and self.missing() is None
 
     def missing(self) -> int | None:
@@ -148,7 +147,6 @@ class Confirmed:
 
     @property
     def holds(self) -> bool:
-        """Whether all that was run again ended as before."""
         return self.tried > 0 and not self.differs
 
 

@@ -120,7 +120,6 @@ class MadeTextures:
         return levels
 
     def about(self) -> dict[str, object]:
-        """Their version."""
         return {"made": VERSION}
 
 

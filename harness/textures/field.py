@@ -34,7 +34,6 @@ class Draw:
         self._rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed)))
 
     def number(self, low: float, high: float) -> float:
-        """Uniform."""
         return low + (high - low) * float(self._rng.random())
 
     def whole(self, low: int, high: int) -> int:
@@ -42,11 +41,9 @@ class Draw:
         return low + int(self._rng.random() * (high - low + 1))
 
     def chance(self, share: float) -> bool:
-        """True that often."""
         return float(self._rng.random()) < share
 
     def pick(self, some: Sequence[T]) -> T:
-        """One of them."""
         return some[self.whole(0, len(some) - 1)]
 
     def grid(self, *shape: int) -> Field:

@@ -63,11 +63,9 @@ class PoseRecorder:
         self.frames: list[Mapping[str, Pose]] = []
 
     def started(self, world: World) -> None:
-        """Keep how everything stands at the start."""
         self._keep(world, 0.0)
 
     def polled(self, world: World, time: float) -> None:
-        """Keep this instant if the next frame is due."""
         if time >= self.times[-1] + EVERY - 1e-6:
             self._keep(world, time)
 
@@ -75,7 +73,6 @@ class PoseRecorder:
         """A playback shows times, not actions."""
 
     def ended(self, world: World) -> None:
-        """Keep the last instant."""
         self._keep(world, world.snapshot().time)
 
     def _keep(self, world: World, time: float) -> None:
@@ -273,7 +270,6 @@ class Scene3D:
         return shown.happened
 
     def name_objects(self, wanted: bool) -> None:
-        """Show the objects' names, or not."""
         for label in self._labels.values():
             label.visible = wanted
 

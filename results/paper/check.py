@@ -50,7 +50,6 @@ class Check:
 
     @property
     def agrees(self) -> bool:
-        """Whether the printed value is reproduced."""
         return abs(self.printed - self.recomputed) <= self.tolerance + 1e-9
 
     def __str__(self) -> str:

@@ -141,7 +141,6 @@ class Column:
         return _untied(values, self.published) if self.published else values
 
     def value(self, metric: str, row: str, level: int) -> float | None:
-        """Percent, unrounded."""
         return self.values[metric].get((row, level))
 
     def estimate(self, metric: str, row: str, level: int) -> Estimate | None:
@@ -195,7 +194,6 @@ class Column:
 
     @property
     def covers_basic(self) -> bool:
-        """Whether it lists any basic grounding task."""
         return any(cell.category in BASIC for cell in self.scores.cells.values())
 
     def not_run(self, level: int) -> int:

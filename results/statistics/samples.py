@@ -74,7 +74,6 @@ class Sample:
 
     @property
     def trials(self) -> int:
-        """Number of outcomes."""
         return sum(self.counts)
 
     @property
@@ -89,7 +88,6 @@ class Sample:
 
     @property
     def binary(self) -> bool:
-        """Whether outcomes can only be 0 or 1."""
         return len(self.counts) == 2
 
     @property

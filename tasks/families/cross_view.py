@@ -113,7 +113,6 @@ class ObjectSpread:
 
     @property
     def alike(self) -> bool:
-        """Whether all objects of a scene are equal."""
         return len(self.assets) == 1
 
     def allowed(self, workcell: Workcell, x: Array, y: Array) -> Mask:

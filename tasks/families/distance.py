@@ -70,7 +70,6 @@ class Rules:
 
     @property
     def levels(self) -> dict[int, Level]:
-        """The five levels."""
         return {k: Level(count, 1, 150) for k, count in enumerate(self.counts, 1)}
 
 

@@ -142,7 +142,6 @@ def _draw_blocks(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
 
 
 def _blocks_goal(scene: Scene) -> AfterCue:
-    """The shown colours' blocks in the strip near the robot, after the wall has come."""
     facts = WallFacts.of(scene)
     return AfterCue(gather(facts.targets, facts.others, NEAR), [facts.wall])
 
@@ -158,7 +157,6 @@ def _blocks_plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def _blocks_slots(scene: Scene) -> Slots:
-    """What is shown, and where the blocks have to go; no colour is named."""
     count = len(WallFacts.of(scene).targets)
     return BLOCKS_TEXT.slots("wall", f"blocks.{by_count(count)}", "strip", word=NUMBERS[count])
 
@@ -221,7 +219,6 @@ def _objects_goal(scene: Scene) -> AfterCue:
 
 
 def _objects_slots(scene: Scene) -> Slots:
-    """What is shown and which way round to go; no object is named."""
     count = len(ObjectsFacts.of(scene).order)
     return OBJECTS_TEXT.slots("wall", f"objects.{by_count(count)}", word=NUMBERS[count])
 
@@ -288,7 +285,6 @@ def _draw_turned(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
 
 
 def _turned_goal(scene: Scene) -> AfterCue:
-    """The near blocks turned like the far ones, after the wall has come."""
     facts = TurnedFacts.of(scene)
     wanted = [
         OrientationTarget(name, yaw_rotation(TURNS[turn]), scene.table_top + LOW)
@@ -314,7 +310,6 @@ def _turned_plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def _turned_slots(scene: Scene) -> Slots:
-    """Which blocks are to be turned like which; no direction is named."""
     count = len(TurnedFacts.of(scene).near)
     some = "one" if count == 1 else "many"
     entries = (f"{slot}.{some}" for slot in ("wall", "near", "far"))

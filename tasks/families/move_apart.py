@@ -114,7 +114,6 @@ def _draw_blocks(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
 
 
 def _blocks_goal(scene: Scene) -> Tracker:
-    """Every block on its colour's side; the other side is astray."""
     facts = BlocksFacts.of(scene)
     parts = [Destination(name, (RIGHT,), (LEFT,)) for name in facts.right]
     parts += [Destination(name, (LEFT,), (RIGHT,)) for name in facts.left]

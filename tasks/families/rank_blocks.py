@@ -217,7 +217,6 @@ RANKINGS = (
 
 
 def _goal(ranking: Ranking, scene: Scene) -> Tracker:
-    """The row from left to right, or at level 1 a block in the near band."""
     order = Facts.of(scene).order
     if scene.level == 1:
         return bring_alone(order[0], NEAR_BAND, ranking.released)

@@ -104,7 +104,6 @@ class Crowd:
 
     @property
     def alike(self) -> bool:
-        """Whether all objects of a scene are equal."""
         return len(self.families) == 1
 
 

@@ -84,7 +84,6 @@ class Rests(Condition):
         self._home = snapshot.poses[self.name]
 
     def holds(self, snapshot: Snapshot, before: bool) -> bool:
-        """True if it lies there; `before` is the last value."""
         pose = snapshot.poses[self.name]
         against = [snapshot.poses[t] for t in self.targets] or [self._home]
         if not any(self.near(pose, other) for other in against):
@@ -106,7 +105,6 @@ class Opened(Condition):
     angle: float
 
     def holds(self, snapshot: Snapshot, before: bool) -> bool:
-        """True if it is open far enough at this instant."""
         return snapshot.hinges[self.name] >= self.angle
 
 

@@ -137,7 +137,6 @@ class PressCounter:
         self._pushed.start(any(c.touching for c in found), snapshot.time)
 
     def update(self, snapshot: Snapshot) -> bool:
-        """True if a press begins at this instant."""
         found = self.contacts(snapshot)
         closed, time = self._closed(snapshot), snapshot.time
         pressing = bool(found) and closed
@@ -213,7 +212,6 @@ class StampCounter:
         self._armed = self._raw_armed = not self.pressing
 
     def update(self, snapshot: Snapshot) -> bool:
-        """True if a stamp begins at this instant."""
         level, height = self.offset(snapshot)
         if level > OFF or height > OFF:
             self._armed = True
@@ -334,7 +332,6 @@ class CycleCounter:
         self._home = snapshot.poses[self.name]
 
     def update(self, snapshot: Snapshot) -> bool:
-        """True if a cycle ends at this instant."""
         if self._pending and not closed_near(snapshot, snapshot.position(self.name), self.radius):
             self._pending, self._released = False, self._released + 1
         if self._up(snapshot, self._home):

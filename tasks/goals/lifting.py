@@ -221,7 +221,6 @@ class PickTracker:
         return self._lift_tracker.update(snapshot)
 
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """Events of this instant; none after success."""
         if self._done:
             return ()
         events = self._lift_tracker.update(snapshot)
@@ -244,7 +243,6 @@ class PickTracker:
         return events
 
     def diagnostics(self) -> dict[str, object]:
-        """None: the events say it all."""
         return {}
 
     def _held(self, snapshot: Snapshot) -> bool:

@@ -190,7 +190,6 @@ class Pair(conditions.Condition):
         self._ceilings = [snapshot.height(name) + RAISED for name in self.movers]
 
     def holds(self, snapshot: Snapshot, before: bool) -> bool:
-        """True if both are in place; `before` is the last value."""
         left, right = places = [snapshot.position(name) for name in self.movers]
         in_place = (
             right[0] > left[0]
@@ -253,7 +252,6 @@ class Layer(conditions.Condition):
     within: float
 
     def holds(self, snapshot: Snapshot, before: bool) -> bool:
-        """True if it rests there; `before` is the last value."""
         x, y, z = here = snapshot.position(self.name)
         below = snapshot.position(self.below)
         in_place = (
@@ -346,7 +344,6 @@ class Nested(conditions.Condition):
     vessels: _Vessels
 
     def holds(self, snapshot: Snapshot, before: bool) -> bool:
-        """True if it stands there; `before` is the last value."""
         if self.name not in self.vessels.at(snapshot):
             return False
         return before or not closed_near(snapshot, snapshot.position(self.name), RIM_RADIUS)
