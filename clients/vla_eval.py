@@ -109,7 +109,8 @@ class VlaEvalSession(StatelessSession):
         name = str(greeting.get("model_server", ""))
         announced = {key: json_values(greeting[key]) for key in ANNOUNCED if key in greeting}
         server = printable(f"{name} {greeting.get('harness_version', '')}", 200)
-        warnings = (*WARNINGS, *_mismatches(announced, options))
+        odd = (*_state_not_sent(announced, options), *_other_width(announced, options))
+        warnings = (*WARNINGS, *odd)
         super().__init__("vla-eval", spec, options, warnings, server=server, said=announced)
 
     def reset(self, id: int, trial: TrialInfo) -> None:
@@ -171,11 +172,6 @@ class VlaEvalSession(StatelessSession):
 STATE_NAMES = ("state", "states")
 """Names of a state that its model servers look for and its RoboTwin benchmark does not send."""
 ANNOUNCED = ("observation_params", "action_spec", "observation_spec", "capabilities")
-
-
-def _mismatches(announced: Mapping[str, object], options: VlaEvalClientOptions) -> list[str]:
-    """What the server announces and does not fit the options."""
-    return [*_state_not_sent(announced, options), *_other_width(announced, options)]
 
 
 def _state_not_sent(

@@ -55,21 +55,18 @@ def agreement(variants: Iterable[Counts]) -> Agreement:
     found = list(variants)
     chances = np.ones(1)
     for counts in found:
-        chances = np.convolve(chances, _fisher(counts))
+        given = counts.claimed + counts.fresh
+        own = _hypergeometric(given, counts.claimed_trials, counts.fresh_trials)
+        chances = np.convolve(chances, own)
     fresh = sum(counts.fresh for counts in found)
     expected = float(chances @ np.arange(len(chances)))
     lower, upper = float(chances[: fresh + 1].sum()), float(chances[fresh:].sum())
     return Agreement(fresh, expected, min(1.0, lower), min(1.0, upper))
 
 
-def _fisher(counts: Counts) -> Array:
-    """Chance of 0, 1, ... fresh successes given all successes of a variant."""
-    successes = counts.claimed + counts.fresh
-    return _hypergeometric(successes, counts.claimed_trials, counts.fresh_trials)
-
-
 @cache
 def _hypergeometric(successes: int, claimed: int, fresh: int) -> Array:
+    """Chance of 0, 1, ... fresh successes, given all `successes` of so many trials."""
     total = log_choose(claimed + fresh, successes)
     return np.array(
         [

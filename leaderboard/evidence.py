@@ -74,17 +74,13 @@ def drawn(challenge: str, bundle: str, keys: Sequence[TrialKey], count: int) -> 
     return sorted(keys, key=lambda key: _hash(f"{seed}/{key.slug}"))[:count]
 
 
-def forged_of(trials: int) -> int:
-    """How many outcomes a sample has to catch: FORGED of `trials`, at least one."""
-    return max(1, math.floor(FORGED * trials))
-
-
 def least_sample(trials: int) -> int:
-    """The smallest sample of `trials` that misses `forged_of(trials)` at most once in a thousand.
+    """The smallest sample of `trials` that misses FORGED of them (one at least) at most once in a
+    thousand.
 
     It is 135 of 28,000 trials, 131 of 2,000, and all of fewer than 20.
     """
-    forged, missed = forged_of(trials), 1.0
+    forged, missed = max(1, math.floor(FORGED * trials)), 1.0
     for count in range(trials):
         if missed <= MISSED:
             return count

@@ -27,7 +27,7 @@ from robospa.leaderboard.rules import Reference, VariantFacts, spec_of
 from robospa.leaderboard.traces import Trace, split_trace
 from robospa.results.records.manifest import PolicySpecification, RunSettings
 from robospa.results.records.runs import FIELDS, KEY_FIELDS, finished, from_data
-from robospa.results.records.trial_record import EventRow, TrialRecord
+from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.repeats import repeats
 from robospa.tasks.events import KINDS, Event, outcome
 
@@ -210,7 +210,8 @@ def _events(record: TrialRecord) -> str:
 
 def _end(record: TrialRecord) -> str:
     """How end, outcome and events contradict each other; "" if they do not."""
-    counted = [Event(0.0, e["kind"], "", e["index"]) for e in record.events if _counts_in(e)]
+    counts = {*SUBTASK, *DECIDING}
+    counted = [Event(0.0, e["kind"], "", e["index"]) for e in record.events if e["kind"] in counts]
     reached = outcome(counted, record.total)
     claimed = (record.success, record.done, record.best)
     if claimed != (reached.success, reached.done, reached.best):
@@ -229,10 +230,6 @@ def _end(record: TrialRecord) -> str:
         if abs(event["time"] - ended) > CLOCK or event["step"] != record.steps:
             return f"goes on after its {event['kind']}"
     return ""
-
-
-def _counts_in(event: EventRow) -> bool:
-    return event["kind"] in SUBTASK or event["kind"] in DECIDING
 
 
 def _times(record: TrialRecord) -> str:

@@ -29,7 +29,7 @@ from pathlib import Path
 from robospa.harness.robots import embodiments
 from robospa.harness.seeds.attempt import Evidence, expert_pool
 from robospa.harness.seeds.lists import inputs, read_levels, save
-from robospa.harness.seeds.summary import expert_table, read_rows, row_of, write_rows
+from robospa.harness.seeds.summary import read_rows, row_of, write_rows
 from robospa.harness.seeds.sweep import confirm, searches, sweep_with_bar
 from robospa.harness.selection import (
     canonical_mode,
@@ -38,7 +38,6 @@ from robospa.harness.selection import (
     parse_tasks,
 )
 from robospa.results.paper.published import load
-from robospa.results.tables import show
 from robospa.tasks.catalog import LEVELS
 from robospa.tasks.seeds import FIRST_SEED, PER_VARIANT, ListKey
 from robospa.text import plain_console
@@ -75,7 +74,7 @@ def chosen(options: argparse.Namespace) -> list[ListKey]:
 
 
 def main() -> None:
-    """Make what is missing and print the table."""
+    """Make what is missing."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -100,7 +99,6 @@ def main() -> None:
         print(f"{key}: {text}", flush=True)
     rows = read_rows(options.table)
     made = [rows[place] for key in keys if (place := (key, options.start)) in rows]
-    show(expert_table(made))
     print(f"{len(made)} of {len(keys)} lists in {options.table}")
 
 

@@ -45,13 +45,13 @@ def view(
 
 
 def _trial(run: Path, trial: str, html: Path | None, port: int, minutes: float) -> None:
-    from robospa.harness.viewer.show import of_run, show, write_html
+    from robospa.harness.viewer.show import as_html, of_run, show
 
     played, bodies = of_run(run, trial)
     if html is None:
         show(played, bodies, port, minutes)
         return
-    write_html(played, bodies, html)
+    html.write_text(as_html(played, bodies), encoding="utf-8")
     print(f"{played.title} is in {html} ({html.stat().st_size / 1e6:.1f} MB)")
 
 

@@ -96,7 +96,12 @@ class RoboSPAEnv(BaseEnv):
         parts: str = TASK_PARTS,
     ) -> None:
         del reconfiguration_freq  # every trial has a scene of its own
-        _check_backend(num_envs, sim_backend)
+        if num_envs != 1 or sim_backend not in ("auto", *CPU_SIM_BACKENDS):
+            raise SettingsError(
+                f"num_envs={num_envs} with sim_backend={sim_backend!r} is not to be had: an "
+                "environment is one trial on the CPU; for several at once give "
+                "gymnasium.vector.AsyncVectorEnv one each"
+            )
         self.num_envs, self.reconfiguration_freq = 1, 1
         self.backend = parse_sim_and_render_backend(BACKEND, render_backend)
         self.device = self.backend.device
@@ -120,7 +125,8 @@ class RoboSPAEnv(BaseEnv):
         size = {"width": 640, "height": 480, **(human_render_camera_configs or {})}
         self.task_env = TaskEnv(
             task, level, embodiment=robot_uids, mode=mode, split=split, spec=spec, seeds=seeds,
-            control=control, render_mode=render_mode and _rendering(render_mode),
+            control=control,
+            render_mode=render_mode if render_mode in (None, "human") else "rgb_array",
             render_camera=render_camera, render_size=(size["width"], size["height"]),
             world=world, parts=parts,
         )  # fmt: skip
@@ -287,23 +293,10 @@ def register_variants() -> None:
                 register_env(uid, max_episode_steps=limit, task=name, level=level)(RoboSPAEnv)
 
 
-def _check_backend(num_envs: int, sim_backend: str) -> None:
-    if num_envs != 1 or sim_backend not in ("auto", *CPU_SIM_BACKENDS):
-        raise SettingsError(
-            f"num_envs={num_envs} with sim_backend={sim_backend!r} is not to be had: an "
-            "environment is one trial on the CPU; for several at once give "
-            "gymnasium.vector.AsyncVectorEnv one each"
-        )
-
-
 def _one_of(what: str, given: str | None, known: Sequence[str]) -> str:
     if given is not None and given not in known:
         raise SettingsError(f"{what} {given!r} is not one of {', '.join(known)}")
     return given or known[0]
-
-
-def _rendering(mode: str) -> str:
-    return mode if mode == "human" else "rgb_array"
 
 
 def _cameras(names: Sequence[str], configs: Mapping[str, Any]) -> tuple[CameraSpec, ...]:

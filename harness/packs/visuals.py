@@ -245,7 +245,8 @@ def _arm_skins(
     frames = _frames_at_zero(arm)
     groups: dict[str, list[MeshUse]] = {}
     for link, uses in urdf.visuals.items():
-        carrier = _carrier(urdf, link, moving)
+        # Other joints (wheels, a second pair of arms) stay at 0.
+        carrier = next((one for one in urdf.above(link) if one in moving), "")
         if carrier in ours:
             target = ours[carrier]
         elif carrier == "" and still:
@@ -257,12 +258,6 @@ def _arm_skins(
             MeshUse(use.file, to_ours @ use.transform) for use in uses
         )
     return {link: Skin(str(skin_of(archive, uses, full))) for link, uses in groups.items() if uses}
-
-
-def _carrier(urdf: Urdf, link: str, moving: frozenset[str]) -> str:
-    """The nearest of the links in `moving` that `link` is or hangs on; "" if there is none. Other
-    joints (wheels, a second pair of arms) stay at 0."""
-    return next((one for one in urdf.above(link) if one in moving), "")
 
 
 def _frames_at_zero(arm: Arm) -> dict[str, Floats]:

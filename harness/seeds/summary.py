@@ -6,21 +6,17 @@ import csv
 import io
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 
 from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.seeds.sweep import Search
-from robospa.results.tables import Table, TableCell, TableRow
-from robospa.tasks.catalog import task
 from robospa.tasks.seeds import ListKey
 
 REASONS = 3
 """Reasons that a row names."""
 NUMBER = re.compile(r"-?\d+(\.\d+)?")
-GOAL = 0.95
-"""The share of seeds that the expert has to solve of every variant with every robot."""
 
 
 @dataclass(frozen=True)
@@ -85,47 +81,3 @@ def write_rows(path: Path, rows: Mapping[tuple[ListKey, int], Row]) -> None:
     order = sorted(rows.values(), key=lambda r: (r.embodiment, r.mode, r.task, r.level, r.start))
     writer.writerows([getattr(row, name) for name in names] for row in order)
     replace_file(path, text.getvalue().encode())
-
-
-def expert_table(rows: Iterable[Row]) -> Table:
-    """Percent of the tried seeds that the expert solves: category by robot and scene mode."""
-    rows = list(rows)
-    settings = list(dict.fromkeys((r.embodiment, r.mode) for r in rows))
-    categories = list(dict.fromkeys(task(r.task).category for r in rows))
-
-    def line(label: str, chosen: list[Row]) -> TableRow:
-        return TableRow(
-            label,
-            tuple(
-                _share([r for r in chosen if (r.embodiment, r.mode) == setting])
-                for setting in settings
-            ),
-        )
-
-    lines = [line(c, [r for r in rows if task(r.task).category == c]) for c in categories]
-    lines += [line(f"level {n}", [r for r in rows if r.level == n]) for n in _levels(rows)]
-    low = sorted(r for r in _below(rows))
-    return Table(
-        "expert",
-        "Seeds in a row that the expert solves, in percent",
-        "Category, level",
-        tuple(f"{robot} {mode}" for robot, mode in settings),
-        (*lines, line("all", rows)),
-        notes=(f"Below {100 * GOAL:g} %: {', '.join(low)}.",) if low else (),
-    )
-
-
-def _levels(rows: Iterable[Row]) -> list[int]:
-    return sorted({row.level for row in rows})
-
-
-def _below(rows: Iterable[Row]) -> Iterable[str]:
-    return (f"{r.key} ({r.accepted}/{r.tried})" for r in rows if r.accepted < GOAL * r.tried)
-
-
-def _share(rows: list[Row]) -> TableCell:
-    tried = sum(row.tried for row in rows)
-    if not tried:
-        return TableCell("-")
-    value = 100 * sum(row.accepted for row in rows) / tried
-    return TableCell(f"{value:.1f}", value)

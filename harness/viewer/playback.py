@@ -218,12 +218,6 @@ def meshes(shapes: Iterable[Shape], skin: Skin | None = None) -> tuple[DrawnMesh
     return (*made, *([_skinned(skin)] if skin is not None else []))
 
 
-def srgb(linear: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """sRGB levels of linear colours, of any shape."""
-    levels: NDArray[np.uint8] = np.round(255 * np.clip(linear, 0, 1) ** (1 / 2.2)).astype(np.uint8)
-    return levels
-
-
 def _merged(shapes: Sequence[Shape], color: Color) -> DrawnMesh:
     vertices, faces, count = [], [], 0
     for shape in shapes:
@@ -235,7 +229,7 @@ def _merged(shapes: Sequence[Shape], color: Color) -> DrawnMesh:
     return DrawnMesh(
         np.concatenate(vertices).astype(np.float32),
         np.concatenate(faces).astype(np.uint32),
-        srgb(np.asarray(color)),
+        np.round(255 * np.clip(color, 0, 1) ** (1 / 2.2)).astype(np.uint8),
     )
 
 

@@ -103,12 +103,11 @@ def policy_playback(
     world: World,
     policy: Policy,
     key: TrialKey,
-    parts: Callable[[TrialKey], TrialSetup] = task_parts,
 ) -> Playback:
     """The trial `key` with `policy`, run now; passes on what `world` and `policy` raise."""
     recorder = PoseRecorder()
-    record = run_trial(world, policy, key, policy_seed=0, recorder=recorder, parts=parts)
-    return _playback(record, parts(key), recorder)
+    record = run_trial(world, policy, key, policy_seed=0, recorder=recorder)
+    return _playback(record, task_parts(key), recorder)
 
 
 def _playback(record: TrialRecord, setup: TrialSetup, seen: PoseRecorder) -> Playback:
@@ -184,11 +183,6 @@ def show(playback: Playback, bodies: Sequence[DrawnBody], port: int, minutes: fl
             play(advance, until)
         except KeyboardInterrupt:
             print()
-
-
-def write_html(playback: Playback, bodies: Sequence[DrawnBody], path: Path) -> None:
-    """Write `playback` as one HTML page; OSError if it cannot be written."""
-    path.write_text(as_html(playback, bodies), encoding="utf-8")
 
 
 HOST = "127.0.0.1"

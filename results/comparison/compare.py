@@ -369,21 +369,18 @@ def by_axis(models: Sequence[ModelResults], metric: str = "sr") -> Table | None:
             cells = (*map(estimate_cell, own), *(estimate_cell(gap, "+z.1f") for gap in gaps))
             rows.append(TableRow(label, cells, "row" if kind == "category" else "average"))
     paired = all(pair.gap is not None for found in pairs for pair in found.values())
+    how = "paired by seed" if paired else "not paired: some variants share no seed"
+    note = (
+        f"In percent, over the {len(shared)} variants that all have results of, with 95 % "
+        f"intervals; differences in percentage points, {how}."
+    )
     return Table(
         f"{metric}-by-{'-'.join(axes)}",
         f"{METRIC_NAMES[metric]} by {' and '.join(AXES[part] for part in axes)}",
         "",
         (*names, *(f"{name} minus {names[0]}" for name in names[1:])),
         tuple(rows),
-        notes=(_axis_note(shared, paired),),
-    )
-
-
-def _axis_note(shared: Sequence[Variant], paired: bool) -> str:
-    how = "paired by seed" if paired else "not paired: some variants share no seed"
-    return (
-        f"In percent, over the {len(shared)} variants that all have results of, with 95 % "
-        f"intervals; differences in percentage points, {how}."
+        notes=(note,),
     )
 
 

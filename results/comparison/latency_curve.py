@@ -19,12 +19,7 @@ from robospa.results.comparison.pairs import check_comparable, common_seeds, pai
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.models import IncomparableError, ModelResults
 from robospa.results.scoring.scores import Variant, weights_of
-from robospa.results.statistics.intervals import (
-    Estimate,
-    interval_of,
-    mover,
-    paired_sample_difference,
-)
+from robospa.results.statistics.intervals import Estimate, interval_of, paired_mean
 from robospa.results.statistics.significance import p_of_interval
 from robospa.results.tables import Table, TableCell, TableRow, estimate_cell
 
@@ -113,7 +108,10 @@ def latency_curve(models: Sequence[ModelResults]) -> LatencyCurve:
     if not variants:
         raise IncomparableError("these runs share no seed: run them on the same ones")
     weights = weights_of(variants, first.categories)
-    outcomes = [_outcomes(models, v, seeds[v]) for v in variants]
+    outcomes = [
+        np.array([[m.trials[v][seed].success for seed in seeds[v]] for m in models])
+        for v in variants
+    ]
     points = tuple(
         _point(model, first, latency, variants, weights, outcomes, row)
         for row, (model, latency) in enumerate(zip(models, latencies, strict=True))
@@ -134,12 +132,6 @@ def _shared_seeds(models: Sequence[ModelResults], variant: Variant) -> list[int]
     return sorted(found)
 
 
-def _outcomes(
-    models: Sequence[ModelResults], variant: Variant, seeds: Sequence[int]
-) -> NDArray[np.bool_]:
-    return np.array([[m.trials[variant][seed].success for seed in seeds] for m in models])
-
-
 def _point(
     model: ModelResults,
     first: ModelResults,
@@ -154,7 +146,7 @@ def _point(
     if row:
         pairs = {pair.variant: pair for pair in paired_variants(model, first, "sr")[0]}
         gaps = [found.gap for v in variants if (found := pairs[v]).gap is not None]
-        gap = mover([paired_sample_difference(one) for one in gaps], weights)
+        gap = paired_mean(gaps, weights)
         p = p_of_interval(gap)
     records = [record for v in variants for record in model.trials[v].values()]
     return LatencyPoint(
@@ -170,13 +162,9 @@ def _point(
     )
 
 
-def _real_time(record: TrialRecord) -> dict[str, object]:
-    found = record.diagnostics.get(ENTRY)
-    return found if isinstance(found, dict) else {}
-
-
 def _numbers(records: Sequence[TrialRecord], name: str) -> list[float]:
-    values = [_real_time(record).get(name) for record in records]
+    told = [record.diagnostics.get(ENTRY) for record in records]
+    values = [found.get(name) for found in told if isinstance(found, dict)]
     return [float(v) for v in values if isinstance(v, (int, float))]
 
 

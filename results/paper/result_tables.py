@@ -130,7 +130,7 @@ class _Made:
         name: str,
         title: str,
         corner: str,
-        cell: Callable[[Column, str, str, Marked], TableCell],
+        cell: CellMaker,
     ) -> Table:
         """The table, with marks and notes that look at all rows and levels."""
         names = [row for row, _, _ in self.rows if row]

@@ -27,11 +27,10 @@ def rounded(value: float, digits: int = 1) -> float:
     return math.copysign(math.floor(abs(value) * scale + 0.5) / scale, value) + 0.0
 
 
-def is_tie(value: float, digits: int = 1) -> bool:
-    """Whether `value` lies halfway between two printable numbers, but for binary noise."""
-    scaled = abs(value) * 10.0**digits
-    distance = abs(scaled - math.floor(scaled) - 0.5)
-    return distance < 1e-9
+def is_tie(value: float) -> bool:
+    """Whether `value` lies halfway between two printed decimals, but for binary noise."""
+    scaled = abs(value) * 10.0
+    return abs(scaled - math.floor(scaled) - 0.5) < 1e-9
 
 
 def text(value: float, digits: int = 1) -> str:

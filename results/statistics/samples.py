@@ -2,8 +2,7 @@
 
 Resampling n episodes of a variant with replacement and adding up their outcomes gives a sum whose
 distribution is known: the n-th convolution power of the outcomes' histogram (for 0/1 outcomes the
-binomial). So a resample of a variant costs one number instead of n. `resample_episodes` is the slow
-way, kept as the reference that the tests hold the fast one to.
+binomial). So a resample of a variant costs one number instead of n.
 
 What it answers: the same tasks with other seeds. `draw_over_tasks` resamples the tasks as well.
 Where all outcomes of a variant are equal its resamples are all equal too, so a percentile interval
@@ -210,20 +209,6 @@ def _values(sample: Sample, resamples: int, generator: np.random.Generator) -> N
     random = generator.integers(0, GRID, size=resamples, dtype=np.uint16)
     step = sample.scale / sample.trials
     return np.asarray(sample.shift + step * _deck(sample.counts).take(random), dtype=np.float64)
-
-
-def resample_episodes(
-    samples: Sequence[Sample], weights: Sequence[float], seed: int = 0, resamples: int = RESAMPLES
-) -> NDArray[np.float64]:
-    """The values of `draw`, episode by episode: the slow way, to check the fast one against."""
-    _check_weights(samples, weights)
-    generator = np.random.default_rng(seed)
-    drawn = np.zeros(resamples)
-    for sample, weight in zip(samples, weights, strict=True):
-        outcomes = np.repeat(np.arange(len(sample.counts)), sample.counts)
-        picked = generator.integers(0, len(outcomes), size=(resamples, len(outcomes)))
-        drawn += weight * (sample.shift + sample.scale * outcomes[picked].mean(axis=1))
-    return drawn
 
 
 def _check_weights(samples: Sequence[Sample], weights: Sequence[float]) -> None:

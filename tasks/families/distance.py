@@ -340,10 +340,6 @@ def blocks(level: int, rng: np.random.Generator) -> list[Thing]:
     return [("block", {"half": [half] * 3, "color": list(colors[i])}) for i in order]
 
 
-def _block_names(item: SceneObject) -> Phrasings:
-    return TEXT.phrasings("colored.block", color=nearest(tuple(item.params["color"])))
-
-
 BLOCKS = ObjectSet(
     "Blocks",
     Rules(
@@ -357,7 +353,7 @@ BLOCKS = ObjectSet(
         extent=((0.0, 0.0), *((0.22, 0.08),) * 4),
     ),
     blocks,
-    _block_names,
+    lambda item: TEXT.phrasings("colored.block", color=nearest(tuple(item.params["color"]))),
     "block",
     yaw=0.75,
 )

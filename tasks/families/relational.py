@@ -170,10 +170,6 @@ def _label(shape: SlotGrid, slot: tuple[int, int], used: list[tuple[int, int]]) 
     return f"{depth[slot[1]]}_{side[slot[0]]}"
 
 
-def _in_line(a: tuple[int, int], b: tuple[int, int]) -> bool:
-    return a[0] == b[0] or a[1] == b[1]
-
-
 @dataclass(frozen=True)
 class Facts(table.PickFacts):
     """Target, its direction from the reference, and the name of the reference's place."""
@@ -198,7 +194,8 @@ def drawer(crowd: Crowd) -> Draw:
         others = [rest[int(i)] for i in rng.permutation(len(rest))]
         # Three in a corner shape: a diagonal never asks for the corner, so the other directions
         # have to, in two of three scenes; else a guesser would leave the corner out.
-        if shape.count == 3 and not _in_line(target, others[0]) and rng.random() < 1 / 3:
+        corner = shape.count == 3 and all(a != b for a, b in zip(target, others[0], strict=True))
+        if corner and rng.random() < 1 / 3:
             others.reverse()
         used = [target, reference, *others][: shape.count]
         used = [used[int(i)] for i in rng.permutation(len(used))]

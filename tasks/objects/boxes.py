@@ -26,11 +26,11 @@ def on_side(polygon: m.Polygon, half: Vec3, side: float, gap: float = 0.0004) ->
     return m.upright(polygon, at, side)
 
 
-def leaf(size: float, x: float = 0.0, y: float = 0.0) -> list[m.Point]:
+def leaf(size: float) -> list[m.Point]:
     """A pointed oval, tip up."""
     ring = [(0.0, -1.0), (0.5, -0.45), (0.62, 0.1), (0.4, 0.6), (0.0, 1.0)]
     ring += [(-0.4, 0.6), (-0.62, 0.1), (-0.5, -0.45)]
-    return [(x + size * u, y + size * v) for u, v in ring]
+    return [(size * u, size * v) for u, v in ring]
 
 
 TEAS: tuple[tuple[str, str, str], ...] = (

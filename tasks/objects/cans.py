@@ -152,6 +152,7 @@ def bottle(look: int, params: Params) -> ObjectModel:
     wall, shoulder, neck, screw = 0.60 * h, 0.80 * h, 0.0125, 0.0145
     body = [(r - 0.004, 0.0), (r, 0.004), (r, wall), (r * 0.82, 0.69 * h), (neck + 0.001, shoulder)]
     body += [(neck, 0.92 * h)]
+    lid = [(screw, 0.88 * h), (screw, h - 0.001), (screw - 0.001, h)]
     middle = 0.36 * h
     emblem = {"white": colour("red"), "yellow": colour("green")}.get(label, build.PAPER)
     parts = [
@@ -164,7 +165,7 @@ def bottle(look: int, params: Params) -> ObjectModel:
             colour(label),
         ),
         visual(around(m.ellipse(0.0145, 0.021, 10), r + 0.0011, middle), emblem),
-        visual(_cap(screw, 0.88 * h, h), colour(cap), roughness=0.4),
+        visual(m.lathe(lid, 12), colour(cap), roughness=0.4),
     ]
     phrases = build.fill_phrases(
         word, "{} bottle", "{} drink bottle", "bottle in {}", "{} plastic bottle",
@@ -173,11 +174,6 @@ def bottle(look: int, params: Params) -> ObjectModel:
     grasps = build.side_grasps(2 * r, grip)
     top = (0.0, 0.0, h)
     return build.model("bottle", parts, "bottle", phrases, grasps, support=top)
-
-
-def _cap(radius: float, low: float, high: float) -> Mesh:
-    profile = [(radius, low), (radius, high - 0.001), (radius - 0.001, high)]
-    return m.lathe(profile, 12)
 
 
 PILLS = (

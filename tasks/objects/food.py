@@ -181,10 +181,9 @@ def _loaf() -> Made:
     return shapes, (build.top_grasp((0.0, 0.0, 0.036), 0.0565),)
 
 
-def _stroke(hx: float, hy: float, x: float, y: float, z: float, turn: float = 0.0) -> Mesh:
+def _stroke(hx: float, hy: float, x: float, y: float, z: float) -> Mesh:
     bar = [(-hx, 0.0), (0.0, -hy), (hx, 0.0), (0.0, hy)]
-    c, s = math.cos(turn), math.sin(turn)
-    return m.flat([(x + u * c - v * s, y + u * s + v * c) for u, v in bar], z)
+    return m.flat([(x + u, y + v) for u, v in bar], z)
 
 
 def _dome(rx: float, ry: float, h: float) -> list[tuple[float, float, float]]:

@@ -68,11 +68,11 @@ def rounded_rectangle(hx: float, hy: float, radius: float, n: int = 3) -> list[P
     return points
 
 
-def star(outer: float, inner: float, points: int = 5, phase: float = math.pi / 2) -> list[Point]:
-    """Star polygon with `points` tips."""
+def star(outer: float, inner: float) -> list[Point]:
+    """Star polygon with five tips, one of them up."""
     return [
-        (r * math.cos(phase + math.pi * i / points), r * math.sin(phase + math.pi * i / points))
-        for i in range(2 * points)
+        (r * math.cos(math.pi / 2 + math.pi * i / 5), r * math.sin(math.pi / 2 + math.pi * i / 5))
+        for i in range(10)
         for r in ((outer if i % 2 == 0 else inner),)
     ]
 

@@ -21,7 +21,7 @@ from robospa.harness.seeds.lists import (
     read_levels,
     save,
 )
-from robospa.harness.seeds.summary import expert_table, read_rows, row_of, write_rows
+from robospa.harness.seeds.summary import read_rows, row_of, write_rows
 from robospa.harness.seeds.sweep import PATIENCE, Search, confirm, sweep
 from robospa.harness.selection import list_trials, parse_embodiments, parse_modes, seed_sources
 from robospa.harness.settings import Selection, SettingsError
@@ -258,10 +258,6 @@ def test_rows_of_the_experts_table(tmp_path: Path) -> None:
     write_rows(path, {(KEY, 7): row})
     assert read_rows(path) == {(KEY, 7): row}
     assert read_rows(tmp_path / "none.csv") == {}
-    table = expert_table([row])
-    assert [line.label for line in table.rows] == ["GAC", "level 1", "all"]
-    assert {line.cells[0].text for line in table.rows} == {"66.7"}
-    assert table.notes == ("Below 95 %: Pick_Blocks_Size level 1 (2/3).",)
 
 
 def test_modes_with_equal_bodies_share_their_lists() -> None:

@@ -34,7 +34,6 @@ from robospa.results.statistics.samples import (
     draw_over_tasks,
     progress,
     rate,
-    resample_episodes,
 )
 from robospa.results.statistics.significance import (
     at_least,
@@ -376,7 +375,11 @@ def test_one_seed_gives_one_answer_and_another_seed_another() -> None:
 def test_drawing_sums_is_resampling_episodes(samples: list[Sample]) -> None:
     weights = [1 / len(samples)] * len(samples)
     fast = draw(samples, weights, seed=1, resamples=40_000)
-    slow = resample_episodes(samples, weights, seed=2, resamples=40_000)
+    slow, generator = np.zeros(40_000), np.random.default_rng(2)
+    for sample, weight in zip(samples, weights, strict=True):
+        outcomes = np.repeat(np.arange(len(sample.counts)), sample.counts)
+        picked = generator.integers(0, len(outcomes), size=(40_000, len(outcomes)))
+        slow += weight * (sample.shift + sample.scale * outcomes[picked].mean(axis=1))
     noise = slow.std() / math.sqrt(40_000)
     assert abs(fast.mean() - slow.mean()) < 6 * noise
     assert fast.std() == pytest.approx(slow.std(), rel=0.03)
