@@ -63,7 +63,7 @@ class TrialOver(Exception):
 
 
 @dataclass(frozen=True)
-class Target:
+class Meant:
     """What a point means: an object's name, or a place on the table [m, world], or neither."""
 
     name: str | None = None
@@ -71,12 +71,12 @@ class Target:
 
 
 @dataclass(frozen=True)
-class Order:
+class ReadCall:
     """A call with what its points mean."""
 
     call: Call
-    at: Target = Target()
-    to: tuple[Target, ...] = ()
+    at: Meant = Meant()
+    to: tuple[Meant, ...] = ()
 
 
 @dataclass
@@ -120,7 +120,7 @@ class SkillTrial:
 
     # -- what the points mean ------------------------------------------------------------------
 
-    def orders(self, calls: Sequence[Call], spec: PolicySpec) -> list[Order]:
+    def orders(self, calls: Sequence[Call], spec: PolicySpec) -> list[ReadCall]:
         """`calls` with what their points mean at this instant."""
         self._look()
         cameras = {camera.name: camera for camera in spec.cameras}
@@ -130,20 +130,20 @@ class SkillTrial:
             if name is not None
         }
 
-        def meant(point: Point | None, call: Call) -> Target:
+        def meant(point: Point | None, call: Call) -> Meant:
             if point is None or call.camera is None:
-                return Target()
+                return Meant()
             place = call.skill == "place"
             return self._meant(point, cameras[call.camera], seen[call.camera], place)
 
         return [
-            Order(call, meant(call.at, call), tuple(meant(p, call) for p in call.to or ()))
+            ReadCall(call, meant(call.at, call), tuple(meant(p, call) for p in call.to or ()))
             for call in calls
         ]
 
     def _meant(
         self, point: Point, camera: CameraSpec, seen: NDArray[np.int16], place: bool
-    ) -> Target:
+    ) -> Meant:
         """The object drawn at `point`, or nearest to it within RADIUS; for a `place`, which leaves
         out what is held, also the table."""
         scene = self.run.parts.scene
@@ -154,20 +154,20 @@ class SkillTrial:
         if place:
             held = [names.index(name) for name in self.ws.held if name is not None]
             if held and int(seen[_pixel(point, width, height)[::-1]]) in held:
-                return Target(spot=ground)
+                return Meant(spot=ground)
             usable &= ~np.isin(seen, held)
         column, row = _pixel(point, width, height)
         reach = max(1, round(RADIUS * width))
         rows, columns = np.nonzero(usable)
         away = (rows - row) ** 2 + (columns - column) ** 2
         if not len(away) or away.min() > reach**2:
-            return Target()
+            return Meant()
         found = int(seen[rows[away.argmin()], columns[away.argmin()]])
-        return Target(spot=ground) if found in (TABLE, OTHER) else Target(names[found])
+        return Meant(spot=ground) if found in (TABLE, OTHER) else Meant(names[found])
 
     # -- what is done --------------------------------------------------------------------------
 
-    def _perform(self, orders: list[Order]) -> bool:
+    def _perform(self, orders: list[ReadCall]) -> bool:
         """Perform `orders`; True once one of them is `done`."""
         left = list(orders)
         while left:
@@ -193,11 +193,11 @@ class SkillTrial:
                     self._still()
         return False
 
-    def _keep(self, order: Order, feedback: str) -> None:
+    def _keep(self, order: ReadCall, feedback: str) -> None:
         step = len(self.run.actions)
         self.run.calls.append({**plain_call(order.call), "step": step, "feedback": feedback})
 
-    def _done(self, group: list[Order]) -> list[str]:
+    def _done(self, group: list[ReadCall]) -> list[str]:
         """Perform a call, or a pick with the place or drop after it; the feedback of each."""
         first = group[0]
         try:
@@ -213,7 +213,7 @@ class SkillTrial:
             return [_feedback(error)] * len(group)
         return [DONE]
 
-    def _moved(self, first: Order, then: Order) -> list[str]:
+    def _moved(self, first: ReadCall, then: ReadCall) -> list[str]:
         try:
             take = self._planned(first)
         except SkillFailed as error:
@@ -231,7 +231,7 @@ class SkillTrial:
             return [DONE, text] if "cannot be brought" in str(error) else [text, NOT_HELD]
         return [DONE, DONE if self.expert.arrived(put) else NOT_THERE]
 
-    def _planned(self, order: Order) -> object:
+    def _planned(self, order: ReadCall) -> object:
         """The plan's call; raises SkillFailed with feedback if there cannot be one."""
         call, name = order.call, order.at.name
         if call.skill == "home":
@@ -269,7 +269,7 @@ class SkillTrial:
         rise = call.lift or plan.RaiseLower.rise
         return plan.RaiseLower(name, rise, times, self._lifting(name, call.arms))
 
-    def _put(self, order: Order, name: str) -> plan.Place | plan.Drop:
+    def _put(self, order: ReadCall, name: str) -> plan.Place | plan.Drop:
         """The call that puts the held `name` down or drops it."""
         call, at = order.call, order.at
         if call.skill == "drop":
@@ -277,7 +277,7 @@ class SkillTrial:
                 raise SkillFailed(NOTHING)
             return plan.Drop(name, at.name, call.height or plan.Drop.height)
         if at.name == name:
-            at = Target(spot=self.ws.pose(name).position)
+            at = Meant(spot=self.ws.pose(name).position)
         right, ahead = call.offset or (0.0, 0.0)
         turn = None if call.turn is None else self.yaws.get(name, 0.0) + math.radians(call.turn)
         drop = call.height or plan.Place.drop

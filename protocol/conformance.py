@@ -44,6 +44,7 @@ from robospa.protocol.policy import (
     robot_of,
 )
 from robospa.protocol.transport import Address, Timeouts, Transport
+from robospa.text import counted
 from robospa.trial import REFERENCE, TrialKey
 
 KEY = TrialKey("Pick_Blocks_Size", 1, 100_000)
@@ -245,7 +246,7 @@ def _infer(target: _Target) -> str:
         policy.infer(synthetic_observation(target.spec, step=len(chunk)))
         policy.end({"success": False, "end": "step_limit"})
     if isinstance(chunk, list):
-        return f"{len(chunk)} calls, the first one {chunk[0]['skill']}"
+        return f"{counted(len(chunk), 'call')}, the first one {chunk[0]['skill']}"
     return f"float32 {chunk.shape}, finite, numbers from {chunk.min():.3g} to {chunk.max():.3g}"
 
 

@@ -3,7 +3,7 @@
 A policy that knows the plan and sees what every pixel shows finds a pixel of each object that the
 plan names, and says the call. What it solves is what skills can reach at all.
 
-    python tools/skill_ceiling.py OUT.jsonl --seeds 3 [--workers 2] [--tasks A,B]
+    python tools/skill_ceiling.py OUT.jsonl --seeds 3 [--workers 2] [--tasks A,B] [--table OUT.csv]
 
 Seeds are of a range that no list of accepted ones uses; those that the expert itself does not solve
 do not count. A trial that is in OUT
@@ -13,13 +13,15 @@ already is not run again. Prints every variant that is not always solved.
 from __future__ import annotations
 
 import argparse
+import csv
 import json
 import math
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from pathlib import Path
+from statistics import fmean
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,14 +88,14 @@ class PlanInCalls:
             if not isinstance(call, plan.Press):
                 break
         try:
-            picture = Picture(self.world, self.scene)
+            picture = Shown(self.world, self.scene)
             return [picture.said(one) for one in group]
         except NotSeen as error:
             self.note = str(error)
             return [{"skill": "done"}]
 
 
-class Picture:
+class Shown:
     """What the head camera shows now, and where its pixels are."""
 
     def __init__(self, world: SapienWorld, scene: Scene) -> None:
@@ -250,21 +252,25 @@ def run(name: str, level: int, seed: int) -> dict[str, object]:
     }
 
 
-def table(rows: Sequence[dict[str, object]]) -> str:
-    """Solved trials by task and level, tasks that are always solved in one line."""
-    solved: dict[tuple[str, int], Counter[str]] = defaultdict(Counter)
+FIELDS = ("task", "level", "trials", "solved", "actions", "calls")
+
+
+def table(rows: Sequence[dict[str, object]]) -> list[dict[str, object]]:
+    """By variant: trials that count, solved ones, and the means of their actions and calls."""
+    found = defaultdict(list)
     for row in rows:
         if str(row["end"]).split()[0] not in ("unstable:", "expert"):
-            solved[str(row["task"]), int(str(row["level"]))][str(row["end"])] += 1
-    whole = sum(sum(c.values()) for c in solved.values())
-    good = sum(c["success"] for c in solved.values())
-    full = sum(c["success"] == sum(c.values()) for c in solved.values())
-    lines = [f"{good} of {whole} trials solved ({100 * good / max(whole, 1):.2f} %)"]
-    lines.append(f"{full} of {len(solved)} variants solved in every trial; the others:")
-    for (name, level), ends in sorted(solved.items()):
-        if ends["success"] < sum(ends.values()):
-            lines.append(f"{name} {level}: {dict(ends)}")
-    return "\n".join(lines)
+            found[str(row["task"]), int(str(row["level"]))].append(row)
+    return [
+        {
+            **dict(zip(FIELDS, key, strict=False)),
+            "trials": len(some),
+            "solved": sum(row["end"] == "success" for row in some),
+            "actions": round(fmean(float(str(row["steps"])) for row in some), 1),
+            "calls": round(fmean(float(str(row["calls"])) for row in some), 1),
+        }
+        for key, some in sorted(found.items())
+    ]
 
 
 def main() -> None:
@@ -273,6 +279,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--tasks", default="")
+    parser.add_argument("--table", type=Path)
     given = parser.parse_args()
     text = given.out.read_text() if given.out.exists() else ""
     rows = [json.loads(line) for line in text.splitlines()]
@@ -289,7 +296,17 @@ def main() -> None:
         for job in as_completed([pool.submit(run, *key) for key in left]):
             rows.append(job.result())
             print(json.dumps(rows[-1]), file=out, flush=True)
-    print(table(rows))
+    lines = table(rows)
+    if given.table:
+        with given.table.open("w", newline="") as out:
+            writer = csv.DictWriter(out, FIELDS, lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(lines)
+    trials, solved = (sum(int(str(line[name])) for line in lines) for name in ("trials", "solved"))
+    print(f"{solved} of {trials} trials of {len(lines)} variants solved; not always:")
+    for line in lines:
+        if line["solved"] != line["trials"]:
+            print(line)
 
 
 if __name__ == "__main__":

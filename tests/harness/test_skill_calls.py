@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import runpy
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -127,3 +129,12 @@ def test_the_limit_of_actions_bounds_calls(world: SapienWorld) -> None:
     record, _ = run(world, "Stack_Blocks_Color_Order", 3, tower, scale=0.02)
     assert record.end == "step_limit"
     assert record.diagnostics["calls"][-1]["feedback"] == "the trial ended meanwhile"
+
+
+def test_the_example_solves_its_task_and_stands_on_its_page(world: SapienWorld) -> None:
+    docs = Path(__file__).resolve().parents[2] / "docs"
+    code = (docs / "examples" / "by_colour.py").read_text()
+    assert code[code.index("HUES =") :].strip() in (docs / "skills.md").read_text()
+    policy = runpy.run_path(str(docs / "examples" / "by_colour.py"))["ByColour"]()
+    key = TrialKey("Basic_Color_Blocks", 2, accepted("Basic_Color_Blocks", 2)[0])
+    assert run_trial(world, policy, key, policy_seed=0).success
