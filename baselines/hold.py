@@ -1,7 +1,5 @@
 """Hold still: sends the commanded joints back. What a policy that does nothing scores."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

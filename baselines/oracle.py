@@ -10,8 +10,6 @@ purpose, in one known way, which the failure analysis is measured on; or in many
     robospa serve mistakes --arg kind=all
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -3,8 +3,6 @@
 Repeatable: the walk of a trial follows from its policy seed and the step alone.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

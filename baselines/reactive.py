@@ -9,8 +9,6 @@ without looking between them: the same motions, open loop.
 Like the oracle it knows the scene and says so in its spec.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ In a repeatable world this gives the same records without the model. Refuses tri
 does not have.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -8,8 +8,6 @@ entry points (`robospa.clients.dialect`). Everything else (time limits, request 
 chunks, reconnecting between trials) is the same for all.
 """
 
-from __future__ import annotations
-
 import ssl as ssl_module
 from collections.abc import Mapping
 from typing import Any

@@ -3,8 +3,6 @@
 Options: the robot, how many actions a chunk has, and how many tokens of text a model reads.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass

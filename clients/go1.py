@@ -17,8 +17,6 @@ trial decides the noise, and nothing is coded as JSON. It takes one observation 
     PYTHONPATH=AgiBot-World robospa serve go1 --option checkpoint=... --option stats=...
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -5,8 +5,6 @@ more, because such a request never reached a model. The size of an answer is bou
 library only, and no proxies: a model server is a machine of one's own.
 """
 
-from __future__ import annotations
-
 import base64
 import contextlib
 import http.client

@@ -9,8 +9,6 @@ anew, so trials never mix and several of them make one batch.
     robospa serve lerobot --option path=outputs/train/pi05/checkpoints/last/pretrained_model
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -7,8 +7,6 @@ A model's own code is imported lazily, from its own environment: from `PYTHONPAT
 folder given as option `code`. `ModelMissing` says what could not be found.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import importlib

@@ -10,8 +10,6 @@ Reading understands all. Plain numbers only: object, structured and complex arra
 extension types too, so nothing that comes over the wire is ever executed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

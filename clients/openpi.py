@@ -20,8 +20,6 @@ The names are those that `to_openpi` sends at evaluation. openpi's own Aloha con
 prompt among what they take from a dataset; without it, `prompt_from_task` has no effect.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import runpy

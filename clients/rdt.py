@@ -9,8 +9,6 @@ applies in both directions, cancelled, because our grippers are 0..1.
     PYTHONPATH=RoboticsDiffusionTransformer robospa serve rdt --option checkpoint=...
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections import OrderedDict
 from collections.abc import Sequence

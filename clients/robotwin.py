@@ -8,8 +8,6 @@ orders of calls (`calls`). Only names of plain methods are ever sent. The server
 (no authentication, anything callable) remain: let it listen on a machine of one's own only.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 import socket

@@ -11,8 +11,6 @@ training as in evaluation; for such checkpoints the same slip, once on the way i
 way out, must be kept (`order="xyzw"`). It cancels exactly.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -13,8 +13,6 @@ answer: an error in it comes later, in place of an action. So an error or an act
 number than the observation's ends the connection here, and every trial begins on the safe side.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -21,8 +21,6 @@ an id, which its answer must repeat. A message that the server cannot read is ne
 the deadline is the only news.
 """
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -19,8 +19,6 @@ and noise from our seeds, which X-VLA's own server draws from none.
     PYTHONPATH=X-VLA robospa serve xvla --option checkpoint=2toINF/X-VLA-RoboTwin2
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any

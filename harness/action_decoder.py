@@ -11,8 +11,6 @@ a whole number of steps (`action_space`), brought onto the pose in fixed-order a
 (`harness.robots.fixed_order`), and rounded again.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

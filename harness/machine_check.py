@@ -4,8 +4,6 @@ Every check runs in a process of its own with a time limit: a broken driver may 
 process that asks it, and this is here to say so.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

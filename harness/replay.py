@@ -3,8 +3,6 @@
 The world decides everything else, so a repeatable world gives the same record.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

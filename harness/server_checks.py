@@ -10,8 +10,6 @@ arrival, with transport and queue. Every client is a connection of its own, with
 observations of the form that the policy asks for.
 """
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence

@@ -8,8 +8,6 @@ A file is TOML or JSON, one table a group; what it does not name has its default
 relative to the folder in which the command runs, as on the command line.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import tomllib

@@ -8,8 +8,6 @@ The whole is tested, and every cell that a table can be sorted by, corrected aft
 one variant of 280 is lost in the whole.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

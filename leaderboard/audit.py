@@ -4,8 +4,6 @@ Each check gives one sentence with its numbers. `suspicious` is no proof, and no
 none either: an honest model may be near the expert it learned from, and a cheat may add noise.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace

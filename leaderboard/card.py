@@ -11,8 +11,6 @@ skeleton: without case, accents, spaces and punctuation, with characters that lo
 says more, such as "pi0.5 (our lab)", is free.
 """
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Collection

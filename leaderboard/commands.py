@@ -5,8 +5,6 @@ The command line reaches these commands by name: the harness is below the leader
 nothing of it.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import time

@@ -6,8 +6,6 @@ scenes. Those that are replayed follow from a value that nobody can know before 
 in. `evidence.json` is what `robospa submit` writes of both.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 import re

@@ -7,8 +7,6 @@ The announced trials are filmed by playing their recorded actions again; a film 
 already is taken as it is. Addresses and command lines stay at home.
 """
 
-from __future__ import annotations
-
 import os
 import zipfile
 from collections.abc import Callable, Mapping, Sequence

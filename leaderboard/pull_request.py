@@ -8,8 +8,6 @@ announced, and one in the folder that is large or of weights that no recipe of t
 remakes.
 """
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

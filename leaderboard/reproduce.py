@@ -15,8 +15,6 @@ over. Refused: a block that does not hash to the commitment, that has seeds of t
 that gives a seed twice.
 """
 
-from __future__ import annotations
-
 import json
 import secrets
 from collections.abc import Callable, Sequence

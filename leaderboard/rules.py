@@ -5,8 +5,6 @@ The same rules are applied when a run is packed and when a bundle is read. They 
 its own.
 """
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence

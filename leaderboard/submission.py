@@ -16,8 +16,6 @@ All of its trials are replayed, since whoever hands it in may also make the comm
 a sample.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Mapping, Sequence

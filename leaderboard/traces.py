@@ -17,8 +17,6 @@ targets by kinematics, which a later version may compute otherwise; the joint ac
 replayed instead, so an old bundle is replayed to the bit, and their physics steps follow from them.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Sequence
 from itertools import pairwise

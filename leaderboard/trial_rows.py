@@ -9,8 +9,6 @@ A record that breaks one of the rules is of no trial that our harness ran. Wheth
 is a true one is not decided here: replay does that.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterable, Iterator

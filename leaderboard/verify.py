@@ -6,8 +6,6 @@ every scene and sentence.
 The first thing that is not as it has to be ends it, in one sentence.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Iterator, Mapping, Sequence

@@ -8,8 +8,6 @@ The left arm comes first; a gripper is 0 closed to 1 open. A state has the colum
 action, poses of an observation, (2, 8), those of an `ee` action.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

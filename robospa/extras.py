@@ -3,8 +3,6 @@
 `pip install robospa` stays small; everything else is an extra of pyproject.toml.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys

@@ -9,8 +9,6 @@
 the extras `gym` and `sim`.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 
 import_module("robospa.harness.gym.environment").register_tasks()

@@ -5,8 +5,6 @@ its spec names, `state` unless that is `none`, `history`, `privileged` and `envi
 if the spec has them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, TypedDict

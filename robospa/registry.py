@@ -7,8 +7,6 @@ A package adds one by a line in its pyproject.toml, ours and others' alike:
     mine = "my_package.policy:create"
 """
 
-from __future__ import annotations
-
 import difflib
 import importlib
 from collections.abc import Collection

@@ -27,8 +27,6 @@ Rules between fields (one at most as large as another, no name twice) have no pl
 check them after `read`, or in `__post_init__`, whose ValueError comes out in the same way.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import threading

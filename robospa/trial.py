@@ -1,7 +1,5 @@
 """The key of a trial, the unit of scheduling, retry, resume, record and replay; the categories."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 

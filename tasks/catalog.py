@@ -1,7 +1,5 @@
 """The list of tasks, and the one way to build a scene."""
 
-from __future__ import annotations
-
 import hashlib
 import importlib
 from functools import cache

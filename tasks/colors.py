@@ -5,8 +5,6 @@ are CIEDE2000 (Sharma, Wu and Dalal, Color Research and Application 30, 2005), i
 to see across a picture and 2 hardly side by side.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

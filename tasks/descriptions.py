@@ -1,7 +1,5 @@
 """What a reader calls the objects of a scene: "the red block", "the taller block"."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 

@@ -6,8 +6,6 @@ role: a row says what a perfect camera could measure. It says nothing of clutter
 or of what was seen earlier.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Callable

@@ -3,8 +3,6 @@
 A tracker emits events; everything else is derived from the list of them by `outcome`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

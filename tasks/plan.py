@@ -4,8 +4,6 @@
 `arm` None lets the skill choose. Lengths are metres, positions are in the world frame.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from robospa.geometry import Vec3

@@ -12,8 +12,6 @@ every mode; with clutter, some of them end in a clause that names the kinds of t
 (`robospa.tasks.sentences`).
 """
 
-from __future__ import annotations
-
 import hashlib
 import re
 from collections import Counter

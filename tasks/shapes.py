@@ -5,8 +5,6 @@ The origin is the centre of the underside for modelled objects and the centre fo
 (asset `block`), as in the official assets, because official height thresholds are on origins.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """The state of the world at one instant, as goals and experts see it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any

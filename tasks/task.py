@@ -1,7 +1,5 @@
 """The definition of a task: figures per level, facts, and pure functions of its scene."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Protocol, Self

@@ -5,8 +5,6 @@ objects to where each step leaves them: all states of a plan, without physics. `
 of objects that were seen, so that acting knows what to expect.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """`robospa learn`: train the learned reference anew."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Annotated

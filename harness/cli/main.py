@@ -4,8 +4,6 @@ Every error is one sentence on stderr and a non-zero exit code; `--debug` anywhe
 came from.
 """
 
-from __future__ import annotations
-
 import importlib
 import os
 import sys

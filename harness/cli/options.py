@@ -1,7 +1,5 @@
 """What commands share: flags made from settings, bounds of numbers, JSON output."""
 
-from __future__ import annotations
-
 import inspect
 import math
 import sys

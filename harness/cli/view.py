@@ -1,7 +1,5 @@
 """`robospa view`: a run's report in the browser, live while it goes on; or one trial in 3-D."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -13,8 +13,6 @@ equally long whatever the worker, the order and the policy. A real clock counts 
 that one action takes.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence

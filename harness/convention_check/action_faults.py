@@ -5,8 +5,6 @@ and in pairs and looks which brings the answers nearest to a recorded demonstrat
 and origin are fitted to the answers.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations

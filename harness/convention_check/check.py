@@ -9,8 +9,6 @@ A wrong convention is named only if undoing it takes away most of the error: noi
 policy do not look like that. A policy that fits nothing gets no name, but is said not to fit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations

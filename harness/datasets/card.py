@@ -4,8 +4,6 @@ What it says is counted while the data set is packed, in memory that grows with 
 variants, not of episodes.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence

@@ -11,8 +11,6 @@ of it. What is made so far lies below `episodes/` in the folder of the data set:
 Each is written at once or not at all, so a kill at any byte is harmless.
 """
 
-from __future__ import annotations
-
 import json
 import shutil
 import time

@@ -12,8 +12,6 @@ Times in it are fixed. Numbers come back to the bit; a file that was torn, or ch
 that matters, is refused.
 """
 
-from __future__ import annotations
-
 import io
 import struct
 import zipfile

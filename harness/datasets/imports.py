@@ -8,8 +8,6 @@ What they do not hold (`ABSENT`) is left out of the data set, and its card says 
 scenes nobody can play them again, so verification looks at hashes and counts alone.
 """
 
-from __future__ import annotations
-
 import json
 import shlex
 import shutil

@@ -4,8 +4,6 @@ A seed is good if the recorded commands, sent one by one by the rules of an eval
 should. Pictures come last, for good ones alone: they are nearly all that an episode costs.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager

@@ -9,8 +9,6 @@
 A data set without `robospa.json` was not finished.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence

@@ -4,8 +4,6 @@ The same episodes in the same order give the same bytes, so a packing that was c
 again. `robospa.json` comes last: a data set without it was not finished.
 """
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

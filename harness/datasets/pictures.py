@@ -5,8 +5,6 @@ day. Frame t of an episode's film lies at t / FPS seconds. Films have two frames
 refers to later ones, so they are joined by copying the coded pictures and moving their times.
 """
 
-from __future__ import annotations
-
 import io
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence

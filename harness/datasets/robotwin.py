@@ -8,8 +8,6 @@ file has `language_instruction`, which X-VLA reads, and the group `robospa`. Pic
 red and blue exchanged, as official ones are, and are coded here: keep PNG until then.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator
 from pathlib import Path

@@ -2,8 +2,6 @@
 versions that it depends on besides, the command that makes it, and the disk space that it takes.
 """
 
-from __future__ import annotations
-
 import shlex
 import shutil
 from collections.abc import Iterable, Mapping

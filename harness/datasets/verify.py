@@ -4,8 +4,6 @@ Everything that is wrong is one sentence. What a file holds is looked into only 
 right, and episodes are replayed only where all of that is: the first cause is what is told.
 """
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace

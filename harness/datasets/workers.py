@@ -1,8 +1,6 @@
 """The workers of a collection, processes here or actors on a Ray cluster: what they are asked for
 and what they answer."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field

@@ -10,8 +10,6 @@ the poll that finds the goal met: else the command that leads there would be lac
 fast as the official expert does (`DEMONSTRATION_LIMITS`).
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable
 from contextlib import closing

@@ -10,8 +10,6 @@ step limit; none is longer than the 50 steps that an action takes in which nothi
 of a few kilobytes, to be drawn afterwards.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 

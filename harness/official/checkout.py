@@ -4,8 +4,6 @@ URL), what it can do, and the parts of its trials.
 A trial's scene only names what is made there, and its goal is the checkout's own verdict.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -20,8 +20,6 @@ with a `text` instead. `load` is the official protocol: the scene is made, the e
 it, which also gives the `values` of the sentence's placeholders, and then it is made again.
 """
 
-from __future__ import annotations
-
 import importlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Our simulator with the official start of a trial, if that is asked for."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

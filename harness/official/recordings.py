@@ -13,8 +13,6 @@ each frame is an action of the next, by the rules of an evaluation; step limits 
 because recordings have more frames than trials have actions.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import re

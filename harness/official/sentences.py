@@ -15,8 +15,6 @@ Of a checkout's test sentences some stand in training, or are like one of it (`o
 held-out sentences pass that test with none (`docs/instructions.md`).
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

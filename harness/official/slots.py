@@ -6,8 +6,6 @@ describes. Arms that no official sentence names are left out, because that chang
 arm is the one that the official expert takes, as the fact sheets have it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping, Sequence
 from fnmatch import fnmatchcase
 

@@ -5,8 +5,6 @@ and keep everything in view and in reach. What follows from the draw itself cann
 (docs/official-world.md lists it).
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace

@@ -6,8 +6,6 @@ however its path is written, is refused. Entries of the cache are whole or not t
 written under another name and then moved.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json

@@ -7,8 +7,6 @@ filled, here as in SAPIEN: nothing can be put into it then, and no finger reache
 at its rim. Pieces keep at most `CORNERS` corners: those farthest in evenly spread directions.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

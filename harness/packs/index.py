@@ -1,7 +1,5 @@
 """What a user's copy of the official assets holds, and which tasks can run with it."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

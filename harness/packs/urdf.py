@@ -5,8 +5,6 @@ expanding ones) is refused before it is parsed, and so is a mesh of a ROS packag
 archive.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import xml.etree.ElementTree as ET

@@ -10,8 +10,6 @@ frame differs from the URDF's, its meshes are moved by the difference, so that w
 everything is where the URDF has it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -5,8 +5,6 @@ and still smooth for one that sends a whole reach as one action. H.264 in yuv420
 plays it.
 """
 
-from __future__ import annotations
-
 import io
 from collections.abc import Callable, Sequence
 from pathlib import Path

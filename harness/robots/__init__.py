@@ -1,7 +1,5 @@
 """Robots as data, and their kinematics. Each is an entry point in the group `robospa.robots`."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Mapping

@@ -7,8 +7,6 @@ which our own inverse kinematics looks. Link shapes are ours: boxes and cylinder
 listed sizes.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

@@ -4,8 +4,6 @@ Adding a robot means writing one module like `aloha_agilex.py` and naming it amo
 (docs/adding-a-robot.md); nothing else changes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

@@ -12,8 +12,6 @@ and hundredths of a radian off. Rotations in the plane are complex numbers: x - 
 exp(i angle).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """Of what robots are made: shapes of links, joints as descriptions write them, fixed cameras."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

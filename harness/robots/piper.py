@@ -4,8 +4,6 @@ Joint origins, axes, limits, bases, home, fingers, wrist camera and end-effector
 that the official simulator loads; the distance is the one of the official examples.
 """
 
-from __future__ import annotations
-
 import math
 
 from robospa.geometry import Pose, Vec3, look_rotation, yaw_rotation

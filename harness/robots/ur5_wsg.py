@@ -6,8 +6,6 @@ maintainers name for this robot. The description counts a finger's travel from -
 -0.055 m and mirrors it for the other finger; here both count outwards.
 """
 
-from __future__ import annotations
-
 from robospa.geometry import Pose, Vec3, look_rotation
 from robospa.harness.robots import links
 from robospa.harness.robots.embodiment import Arm, Embodiment

@@ -1,7 +1,5 @@
 """`robospa.evaluate`: an evaluation as one call, with every setting as a keyword."""
 
-from __future__ import annotations
-
 import secrets
 from collections.abc import Callable, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Writing files so that a kill at any byte and a full disk are harmless."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import faulthandler

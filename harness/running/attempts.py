@@ -5,8 +5,6 @@ every attempt is on disk before it gets the trial, as the record of a loss that 
 driver would be, and a trial has a fixed number of them however often the run is resumed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

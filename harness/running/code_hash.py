@@ -5,8 +5,6 @@ driver's. What counts are the files of the folders that a trial executes. The po
 a run identifies by its spec, nor do the lists of seeds, which a run's own list of trials replaces.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 from collections.abc import Iterator, Sequence

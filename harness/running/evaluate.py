@@ -4,8 +4,6 @@ Nothing is written before the policy has answered, the world has been built and 
 earlier run of the same folder.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack

@@ -1,7 +1,5 @@
 """Starting a run, and going on with it: its manifest is written once and compared on resume."""
 
-from __future__ import annotations
-
 import json
 import os
 import platform

@@ -6,8 +6,6 @@ file that it did not create, so a torn line stays the last of its file for ever.
 written whole (a full disk) is taken back and raises StorageError: the run stops, nothing is lost.
 """
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import fcntl

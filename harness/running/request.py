@@ -1,7 +1,5 @@
 """From settings to what the driver runs: trials, workers and how their policies are reached."""
 
-from __future__ import annotations
-
 import secrets
 import time
 from collections.abc import Mapping, Sequence

@@ -9,8 +9,6 @@ end so, the run stops (`error_watch`). Which worker runs a trial, and which othe
 holds meanwhile, does not enter the record.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -4,8 +4,6 @@ A trial that a worker may have died of has its next worker to itself: else the s
 could lose all of its attempts.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

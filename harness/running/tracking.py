@@ -4,8 +4,6 @@ The folder stays what counts. A tracker that fails is left alone from then on, w
 costs no trial.
 """
 
-from __future__ import annotations
-
 import secrets
 from collections.abc import Callable, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The expert's trial of one seed: the `run_trial` of every policy, without wire or pictures."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Callable, Mapping

@@ -5,8 +5,6 @@ version of a task, robot or suite does not find it. It is as good as a shipped o
 runs, whose manifest says that it was made there. A ranking knows the shipped lists alone.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

@@ -5,8 +5,6 @@ meanwhile the processes go on with the next variant, so that the seeds tried are
 the last one of the list.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait

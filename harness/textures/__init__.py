@@ -4,8 +4,6 @@
 With $ROBOSPA_TEXTURES they are the files of a folder.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import warnings

@@ -5,8 +5,6 @@ fixes to the bit: sums, products, quotients, roots and roundings of float32, nev
 a sum over an axis or a matrix product. Arrays are (SIZE, SIZE), values mostly 0..1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import TypeVar
 

@@ -1,7 +1,5 @@
 """Wood, cloth, stone, tiles and masonry: what has a grain, threads, grains or joints."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from robospa.harness.textures import field as f

@@ -1,7 +1,5 @@
 """Surfaces without a pattern (paper, plaster, paint, leather, metal, ground) and printed ones."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

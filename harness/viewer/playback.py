@@ -6,8 +6,6 @@ Pure data: it comes from a world (`robospa.harness.viewer.show`) and is shown by
 without its lights and textures; robots are drawn with the shapes that are built in.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ compared as unrelated. Variants that only one side has are left out and counted;
 over them silently. Every difference has an interval, a p, and a q corrected for how many there are.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape

@@ -6,8 +6,6 @@ half of what it is at the lowest latency; its interval comes from drawing the se
 variant anew, for all latencies together.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass

@@ -1,7 +1,5 @@
 """The variants that two models have in common, trial by trial where both ran the same seeds."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ tend to succeed on the same ones; the correlation of their outcomes is what pair
 What averages vary by is what the published models say.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ right; one that is tied to none is put right by any new progress. Plain mistakes
 out of turn) count before traces (an object was reached or lifted, and nothing came of it).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 

@@ -6,8 +6,6 @@ a list of known mistakes. What is given and not derived (per-task success and pr
 robots) can only be checked to be possible at all.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache

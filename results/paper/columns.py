@@ -5,8 +5,6 @@ averages above it, unless the run is in progress, whose averages are over what i
 that lost some trials keeps its rate, and everything above it knows how many are missing. Columns of
 one table must have been measured alike: `check_columns` says where not."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

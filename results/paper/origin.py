@@ -1,7 +1,5 @@
 """What in a run is official and what is this project's own: why the paper is its own suite."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

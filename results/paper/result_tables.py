@@ -5,8 +5,6 @@ what it lost is a † with the range that the lost trials leave open, and a publ
 not follow from the per-task tables is a * with what was printed instead.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby

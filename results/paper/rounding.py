@@ -7,8 +7,6 @@ from zero; a drop is the difference of two values as printed. A mean of somethin
 is not there either: None, never the mean of the rest.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 

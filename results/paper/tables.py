@@ -1,7 +1,5 @@
 """All tables of the paper by name: those of results are in `result_tables`, the others here."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -5,8 +5,6 @@ range stops there. A policy that does so most of the time speaks another languag
 every reader of a run is told: how many actions, how large a share, one example, what to look at.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass

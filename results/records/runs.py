@@ -6,8 +6,6 @@ one trial must agree on everything that a repeatable world decides; if not, that
 `RepeatabilityError`. A run may come from anywhere: `TrialRecord` says what a line may hold.
 """
 
-from __future__ import annotations
-
 import fcntl
 import json
 import os

@@ -6,8 +6,6 @@ same size makes the levels of the Distance tasks comparable with each other. And
 executes long chunks may do a whole memory trial from what it saw before the cue was hidden.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import accumulate, chain

@@ -4,8 +4,6 @@ The official rule lets a policy try one thing after the other until the right on
 it took, pressed, did too early or did once more is in the events of every record.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 

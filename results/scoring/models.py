@@ -1,7 +1,5 @@
 """The results of one model in its setting; different settings are never averaged or compared."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property

@@ -6,8 +6,6 @@ of them: it may drop the connection whenever it is about to fail. So rates are s
 `worst_case` says what is left if every repeated trial had failed in its first attempt.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -6,8 +6,6 @@ The appendix's basic grounding categories have success rates of their own and en
 Missing trials are never averaged away: a cell knows how many it lacks and between which values its
 rate must lie, and every average says how many trials are missing below it."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace

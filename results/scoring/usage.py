@@ -4,8 +4,6 @@ A record keeps it as its policy reported it (`robospa.protocol.policy.USAGE`), a
 count included; a missing trial has no record, so what it has used is not here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 
 from robospa.results.records.trial_record import USAGE, TrialRecord

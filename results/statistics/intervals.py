@@ -9,8 +9,6 @@ Every `Estimate` names the method that made it. Exact intervals need SciPy.
 Except for `over_tasks`, all of them answer: the same tasks with other seeds.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

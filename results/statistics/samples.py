@@ -8,8 +8,6 @@ What it answers: the same tasks with other seeds. `draw_over_tasks` resamples th
 Where all outcomes of a variant are equal its resamples are all equal too, so a percentile interval
 there is a point: see `robospa.results.statistics.intervals` for what to print instead."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

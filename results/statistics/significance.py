@@ -4,8 +4,6 @@
 others, and worse than none. Nothing here needs SciPy, and nothing is random.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from functools import lru_cache

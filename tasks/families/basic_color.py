@@ -4,8 +4,6 @@ Same objects, numbers and layouts as there; every object of a scene has a colour
 the colour alone names the target.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ the extent from left to right: the shortest blocks are wider than long. Area is 
 base; all blocks of a scene are equally high there.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Mapping

@@ -8,8 +8,6 @@ tasks columns count from left to right and rows from far to near, so nothing abo
 be read from the instruction: a reference for how much of the difficulty lies there.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -3,8 +3,6 @@
 A step is a letter, and a `Station` says what it means. The order is asked for, but not enforced.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -7,8 +7,6 @@ Tray: a fixed tray in the middle, a burger at its left, from level 2 on fries at
 level 3 on a fixed bell behind.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -7,8 +7,6 @@ Microwave: a fixed bell on the left, from level 2 on a fixed microwave behind it
 two small things of different kinds; a click counts while the left gripper is closed.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

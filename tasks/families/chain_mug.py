@@ -5,8 +5,6 @@ more a level) on the left. Success: the mug hangs on the rack's peg, the red blo
 left area, every further block on the one before it; nothing latches.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import partial

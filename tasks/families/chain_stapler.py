@@ -7,8 +7,6 @@ Seals: a seal and its pad on the left, from level 3 on another pair on the right
 stapler in the middle.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

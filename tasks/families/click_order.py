@@ -5,8 +5,6 @@ front of the robot. Bells: k equal bells on a wobbly ring anywhere in the region
 seen from above, from the farthest one. Other click tasks share the counters and presses.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -8,8 +8,6 @@ equal objects and two of seven different ones. Spacings are the official ones, t
 kind where objects differ: the place then tells nothing about what lies there.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cache

@@ -6,8 +6,6 @@ those beside the asked one, so that nothing in a scene tells which one is asked 
 of objects also serve the basic tasks that name the target's colour.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ What the right arm takes is handed over by setting it down in the middle of the 
 left arm takes it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass

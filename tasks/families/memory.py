@@ -13,8 +13,6 @@ asked order of colours. Staplers: k fixed staplers in a row, any variant and tur
 1 to 5 for each; one press too many cannot be made good.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

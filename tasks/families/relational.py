@@ -6,8 +6,6 @@ away from the robot. There are three sets of equal objects (tea boxes, cans, soa
 nine different ones; spacings and pitches are the official ones.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

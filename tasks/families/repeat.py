@@ -6,8 +6,6 @@ one. Pot and fan: a pot with two handles, on both of which it has to hang, or a 
 back to where it was.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

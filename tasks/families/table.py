@@ -1,7 +1,5 @@
 """What tasks put on the table: items with neutral names, variants, colours, poses, and the view."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 

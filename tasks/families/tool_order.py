@@ -5,8 +5,6 @@ k), stand around it on one side of the table. Seal: k flat pads of different col
 are stamped from right to left, and a seal beside them.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import pairwise

@@ -9,8 +9,6 @@ Bowls: one fixed plate left or right of the middle, k equal bowls farther away, 
 the plate in any order.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

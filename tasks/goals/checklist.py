@@ -4,8 +4,6 @@ A subtask is a counter's next count (a counter may occur several times) or a `Co
 object is. Counts latch; a condition latches if it says so.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 
 from robospa.geometry import Vec3

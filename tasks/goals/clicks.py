@@ -7,8 +7,6 @@ that is touched when its turn comes is clicked as well. Clicks at the wrong time
 in an order keeps to the same rules; it is grasped, may fall, and belongs to every subtask.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from robospa.tasks.events import Event, ObjectRole

@@ -4,8 +4,6 @@ A placement counts from the moment nothing holds the object: the official rules 
 carried past.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass

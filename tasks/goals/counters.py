@@ -13,8 +13,6 @@ A cycle counts when the object is back home after it was up. Whether it was let 
 not asked (official); the figures count the cycles after which nothing held it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol

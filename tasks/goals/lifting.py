@@ -7,8 +7,6 @@ it. It is dropped if it then falls faster than 0.6 m/s, which takes about 2 cm o
 from that gripper and at a place where it is not meant to fall.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType

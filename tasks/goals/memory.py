@@ -4,8 +4,6 @@ What has to be remembered is hidden by objects that appear. Until then no arm ma
 official, and whoever breaks it has failed for good.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

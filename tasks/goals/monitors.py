@@ -9,8 +9,6 @@ A collision with clutter counts once it has moved a thing: a gripper that slides
 shifting it has done no harm. Things are looked at ten times a second.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

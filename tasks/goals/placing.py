@@ -4,8 +4,6 @@ Places are the table's regions, a container, a guarded strip. Each goal is a `Ch
 conditions, most of which do not latch, with something watched beside it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise

@@ -10,8 +10,6 @@ lights and puts at most five things on the table, and nothing else. Every choice
 name, which stands in trial keys and records.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache

@@ -12,8 +12,6 @@ and plan, and two rules are ours: a gripper has room around what it takes or pre
 hides no object of the task from the head camera.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import re

@@ -6,8 +6,6 @@ the underside (asset `block`: at its centre); the front looks towards -y. Other 
 assets by an entry point (`robospa.registry.ASSETS`).
 """
 
-from __future__ import annotations
-
 import difflib
 import json
 from collections.abc import Mapping

@@ -5,8 +5,6 @@ right; inside are pale walls and a glass turntable. Body and door are boxes that
 There are two sizes, with the housing, hinge and handle of the two official models.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Boxes: `block`, `rubikscube`, cartons `tea_box`, `tissue_box`, `playing_cards`, a `soap` bar."""
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Mapping

@@ -4,8 +4,6 @@ Everything here works in the object's body frame (metres, z up, origin at the ce
 underside, front towards -y).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Upright round packages: `sauce_can`, `can`, `bottle`, `pill_bottle` and `glue`."""
 
-from __future__ import annotations
-
 import math
 
 from robospa.geometry import yaw_rotation

@@ -3,8 +3,6 @@
 For throwing away: `table_trash_bin`, a small bin to empty, and `garbage`, what lies in it.
 """
 
-from __future__ import annotations
-
 import math
 
 from robospa.geometry import Pose, axis_rotation, multiply

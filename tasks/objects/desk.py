@@ -1,7 +1,5 @@
 """Things of a desk: `stapler`, `seal` (a stamp), `mouse` (of a computer), `bell` and `fan`."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

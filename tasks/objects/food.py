@@ -1,7 +1,5 @@
 """Things to eat: `hamburger`, `french_fries`, and seven shapes of `bread`."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import random

@@ -1,7 +1,5 @@
 """Small devices and a toy: `phone`, `remote_control`, `alarm_clock` and `toycar`."""
 
-from __future__ import annotations
-
 import math
 
 from robospa.geometry import Pose, axis_rotation

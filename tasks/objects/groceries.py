@@ -1,7 +1,5 @@
 """More things to pick: `cup`, `apple`, `perfume`, `coffee_box` and `payment_sign`."""
 
-from __future__ import annotations
-
 import math
 import random
 

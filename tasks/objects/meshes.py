@@ -5,8 +5,6 @@ Meshes are made to be few triangles, not smooth: they are drawn on a CPU, many t
 Polygons are sequences of (u, v) points, counter-clockwise.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 

@@ -3,8 +3,6 @@
 `phone_stand`, `display_stand`, `electronic_scale` and `mug_rack`.
 """
 
-from __future__ import annotations
-
 import math
 
 from robospa.geometry import Pose, Vec3, axis_rotation

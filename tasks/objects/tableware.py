@@ -1,7 +1,5 @@
 """Kitchen things that others are put into or onto: `kitchen_pot`, `plate`, `coaster`, `tray`."""
 
-from __future__ import annotations
-
 import math
 
 from robospa.geometry import Pose

@@ -4,8 +4,6 @@ The tint replaces the colour of the body, and grey that of prints and trims whic
 look like a second colour. Shapes, mass and grasps stay those of the look.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Things to work with: `hammer`, `t_block`, `wooden_block`, and `pad`, a flat square to put on."""
 
-from __future__ import annotations
-
 import math
 
 from robospa.geometry import Pose

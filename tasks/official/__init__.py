@@ -4,8 +4,6 @@ Assets that are not listed here (blocks, pads, covers, T-shaped blocks, the garb
 and balls officially too, or are not published: they are always built in.
 """
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field

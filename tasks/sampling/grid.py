@@ -1,7 +1,5 @@
 """Grids: rows and columns, with jitter of each object or of a whole row or column."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise

@@ -10,8 +10,6 @@ likely. A pool is a constant of its arguments, computed once per process; a tria
 only chooses from it.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence

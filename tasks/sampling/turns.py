@@ -4,8 +4,6 @@ Footprints are convex outlines, not circles: long things lie close beside others
 distances, as long as they do not point at them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ There is a folder for each robot and, in it, one for each scene mode, with a fil
 on shipped lists needs no expert.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Mapping, Sequence

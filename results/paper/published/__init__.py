@@ -5,8 +5,6 @@ as printed, misprints included: what does not follow is named by `robospa.result
 Tasks have the names of the environments; `PublishedTask.printed` is the name in the result tables.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
