@@ -33,7 +33,7 @@ from robospa.observation import Observation
 from robospa.protocol.calls import FIELDS, check_calls
 from robospa.protocol.errors import DecodeError, PolicyAnswerError, printable
 from robospa.protocol.options import option
-from robospa.protocol.policy import SKILL, USAGE, PolicySpec, TrialInfo
+from robospa.protocol.policy import CALLED, POINT, SKILL, USAGE, PolicySpec, TrialInfo
 from robospa.schema import Count
 
 log = logging.getLogger("robospa.agent")
@@ -62,22 +62,29 @@ WHAT = {
     "done": "the task is done; nothing comes after it",
 }
 """What a model is told of each skill of `FIELDS`."""
-RULES = """\
+POINTS = """\
+A point is [u, v]: u from 0 at the left edge of the picture to 1 at the right edge, v from 0 at the
+top edge to 1 at the bottom edge. In the picture of the camera head, right is the right of a robot
+that stands before the table, and up is away from it."""
+LEADING = """\
 You lead a robot with two arms at a table. You get a task and pictures, and answer with calls of
 skills. The robot makes them one after the other; then you see what came of each, and new pictures.
 
-A point is [u, v]: u from 0 at the left edge of the picture to 1 at the right edge, v from 0 at the
-top edge to 1 at the bottom edge. It means the object that is drawn there, or the table there. In
-the picture of the camera head, right is the robot's right and up is away from it. All points of an
-answer are in the pictures of now: do not plan further than they show.
+{points} A point means the object that is drawn there, or the table there.
+All points of an answer are in the pictures of now: do not plan further than they show.
 
 Skills, the fields that each needs, and in brackets those that it may have:
 {skills}
 arm is "left" or "right"; left out, the robot chooses. Do only what is asked for: to touch a wrong
 object counts against you. Write into "note" what you have to remember, such as what you see now and
 will be hidden later; you get your notes back."""
-"""What a model is told at every question."""
-FORM = '{"note": "...", "calls": [{"skill": "pick", "at": [0.5, 0.5]}, ...]}'
+POINTING = """\
+You get a task for a robot, and a picture of its table. Answer with the one call "point", at a point
+of the picture on the object that the robot has to take or press.
+
+{points}"""
+"""What a model is told at every question, in either space."""
+FORM = '{"note": "...", "calls": [{"skill": "%s", "at": [0.5, 0.5]}]}'
 """An answer in text."""
 ACT: Message = {
     "type": "object",
@@ -98,6 +105,7 @@ TOOLS: Message = {
 class AgentOptions(EndpointOptions):
     """What the model sees, and what a trial may cost."""
 
+    space: str = option(SKILL, "what it answers: calls of skills, or a point each", CALLED)
     cameras: str = option("head", "cameras whose pictures it gets: names with commas")
     width: Count = option(640, "pixels of a picture, across")
     height: Count = option(480, "pixels of a picture, down")
@@ -193,7 +201,7 @@ class Agent:
         said, wrong = "", ""
         parts = question(trial, made, given)
         try:
-            answer = self._endpoint.ask(request(parts, given.form == "tools"), until, used)
+            answer = self._endpoint.ask(request(parts, given), until, used)
             said = " ".join(answer.tools) or answer.text
             return read_answer(answer, self.spec)
         except BadAnswer as error:
@@ -233,7 +241,7 @@ def spec_of(options: AgentOptions) -> PolicySpec:
         "name": f"agent:{printable(options.model, 190)}",
         "cameras": [{"name": name, **size} for name in options.cameras.split(",")],
         "state": "none",
-        "action": SKILL,
+        "action": options.space,
         "checkpoint": printable(options.model, 200),
     }
     try:
@@ -282,14 +290,18 @@ def _pictures(one: Sight) -> Iterator[Message]:
         yield {"type": "image_url", "image_url": {"url": f"data:image/png;base64,{png}"}}
 
 
-def request(parts: Sequence[Message], tools: bool) -> Message:
+def request(parts: Sequence[Message], options: AgentOptions) -> Message:
     """What is sent to an endpoint to ask for the next calls."""
-    how = "Call the function act." if tools else f"Answer with one JSON object: {FORM}"
+    pointing, tools = options.space == POINT, options.form == "tools"
     skills = [
         f"  {' '.join(filter(None, (name, needed, taken and f'({taken})')))}: {WHAT[name]}"
         for name, (needed, taken) in FIELDS.items()
+        if name in WHAT
     ]
-    system = {"role": "system", "content": RULES.format(skills="\n".join(skills)) + f"\n{how}"}
+    rules = (POINTING if pointing else LEADING).format(points=POINTS, skills="\n".join(skills))
+    form = FORM % ("point" if pointing else "pick")
+    how = "Call the function act with" if tools else "Answer with one JSON object:"
+    system = {"role": "system", "content": f"{rules}\n{how} {form}"}
     user = {"role": "user", "content": list(parts)}
     return {"messages": [system, user], **(TOOLS if tools else {})}
 

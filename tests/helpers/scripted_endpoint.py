@@ -162,12 +162,12 @@ def coloured(picture: NDArray[np.uint8], colour: str) -> list[float]:
     return [round(float(x.mean()) / n, 4) for x, n in zip((columns, rows), (640, 480), strict=True)]
 
 
-def by_colour(shown: Shown) -> list[dict[str, Any]]:
+def by_colour(shown: Shown, skill: str = "pick") -> list[dict[str, Any]]:
     """Picks up what has the sentence's first colour; of several it stacks one on the other."""
     names = [word for word in re.findall(r"\w+", shown.sentence) if word in HUES]
     names = list(dict.fromkeys(names))
     if len(names) < 2:
-        return [{"skill": "pick", "at": coloured(shown.picture, names[0])}]
+        return [{"skill": skill, "at": coloured(shown.picture, names[0])}]
     placed = sum(text.count('"place"') for text in shown.texts)
     if placed == len(names):
         return [{"skill": "done"}]
