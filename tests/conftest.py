@@ -1,7 +1,5 @@
 """What all tests share: processes that they start find the modules of `tests/helpers` too."""
 
-from __future__ import annotations
-
 import os
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The results of benchmarks have one form, and their page says what they say."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import sys

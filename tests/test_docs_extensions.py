@@ -1,8 +1,6 @@
 """The worked examples of a task, a robot, a scene mode and a dialect, each found by the entry point
 of an installed package and run whole."""
 
-from __future__ import annotations
-
 import re
 import sys
 import threading

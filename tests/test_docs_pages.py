@@ -1,7 +1,5 @@
 """The documentation's pages: every page has its place, and what it names or links to exists."""
 
-from __future__ import annotations
-
 import pkgutil
 import re
 import shlex

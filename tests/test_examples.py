@@ -1,7 +1,5 @@
 """The scripts in examples/ run, each with its smallest settings."""
 
-from __future__ import annotations
-
 import json
 import re
 import runpy

@@ -1,7 +1,5 @@
 """Imports point one way, packaging lists what exists, and starting up stays light."""
 
-from __future__ import annotations
-
 import ast
 import subprocess
 import sys

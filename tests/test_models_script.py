@@ -1,7 +1,5 @@
 """Which Python the environments with torch are made with; nothing is installed."""
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The source archive is complete, and what is installed from it is the whole package."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

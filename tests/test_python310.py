@@ -1,7 +1,5 @@
 """Models live in environments with Python 3.10, so what serves them must run there."""
 
-from __future__ import annotations
-
 import ast
 import os
 import shutil

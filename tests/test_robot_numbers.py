@@ -1,7 +1,5 @@
 """The Aloha is one robot of several: only its own modules know its name and its numbers."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,5 @@
 """The set-up script's decisions, made by its own functions; nothing is installed."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 from pathlib import Path

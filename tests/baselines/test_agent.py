@@ -1,7 +1,5 @@
 """The agent: what it asks an endpoint, whose fault a missing answer is, and what is counted."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """What is scored without reading or without grasping: blind policies, and abuse of the physics."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What must go right and wrong in the same way in every dialect."""
 
-from __future__ import annotations
-
 import socket
 import threading
 from collections.abc import Callable

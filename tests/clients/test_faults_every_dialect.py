@@ -1,7 +1,5 @@
 """What a server or its line does wrong ends in the same way in every dialect."""
 
-from __future__ import annotations
-
 import contextlib
 import itertools
 import re

@@ -1,7 +1,5 @@
 """GO-1's server: what exactly it is sent, and what becomes of its answers."""
 
-from __future__ import annotations
-
 import shutil
 import ssl
 import subprocess

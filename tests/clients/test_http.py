@@ -1,7 +1,5 @@
 """HTTP answers without an end: refused at their deadline, in one sentence."""
 
-from __future__ import annotations
-
 import contextlib
 import itertools
 import socket

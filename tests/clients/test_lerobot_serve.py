@@ -1,7 +1,5 @@
 """A LeRobot policy gets the keys, sizes and widths of its own configuration, through processors."""
 
-from __future__ import annotations
-
 from collections import deque
 from types import SimpleNamespace
 from typing import Any

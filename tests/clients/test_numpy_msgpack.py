@@ -1,7 +1,5 @@
 """What is announced is there, before anything is allocated for it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import msgpack

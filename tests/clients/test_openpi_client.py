@@ -1,7 +1,5 @@
 """A server of openpi's form, and our client."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from types import SimpleNamespace

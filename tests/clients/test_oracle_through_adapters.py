@@ -5,8 +5,6 @@ conventions, adds to it what the oracle wants to change, and answers in the serv
 conventions. Only if the adapter turns both ways round right do the right commands come out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """A vla-eval server: what exactly it is sent, and what becomes of its answers."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import re

@@ -1,7 +1,5 @@
 """X-VLA's server: what exactly it is sent, and what becomes of its answers."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

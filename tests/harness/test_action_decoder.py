@@ -1,7 +1,5 @@
 """What is read from a policy's numbers, and what is refused."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import subprocess

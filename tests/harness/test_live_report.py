@@ -1,7 +1,5 @@
 """The page of a run that goes on: what is served to whom, and that it follows the records."""
 
-from __future__ import annotations
-
 import http.client
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Questions of pointing: what a point means, and a run of a policy that answers one."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from typing import Any

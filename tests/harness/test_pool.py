@@ -1,7 +1,5 @@
 """Workers that die are replaced, and none outlives its parent, whatever it was started for."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

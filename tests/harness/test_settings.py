@@ -1,7 +1,5 @@
 """One definition of an evaluation's settings: as flags, as a file, as keywords."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 import json

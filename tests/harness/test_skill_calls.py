@@ -1,7 +1,5 @@
 """Calls of skills in a real trial: what is solved, what is told, what is kept and replayed."""
 
-from __future__ import annotations
-
 import runpy
 from pathlib import Path
 from typing import Any

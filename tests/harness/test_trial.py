@@ -1,7 +1,5 @@
 """One trial: when the policy is asked, when it ends, and what the record says."""
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import replace
 

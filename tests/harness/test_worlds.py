@@ -1,7 +1,5 @@
 """Kinds of worlds: found by name, and what each answers to a run."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import replace

@@ -4,8 +4,6 @@
 docs/fidelity.md that says why ours differs and `official` gives (success, done) there.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

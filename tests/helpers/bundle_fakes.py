@@ -1,7 +1,5 @@
 """Runs and bundles that need no simulator, and tools that forge them consistently."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 import zipfile

@@ -1,7 +1,5 @@
 """A small made-up checkout of RoboSPA: the folders and keys of the official one, our own words."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path

@@ -1,8 +1,6 @@
 """A world in which a robot that is sent the same action again stays where it is, and a policy that
 walks on from where it sees the robot."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any

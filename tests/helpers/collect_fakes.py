@@ -1,7 +1,5 @@
 """Collecting without a simulator: episodes that follow from their seed, workers in this process."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The command line, called in this process: a Python of its own costs a second each time."""
 
-from __future__ import annotations
-
 import io
 import os
 from contextlib import redirect_stderr, redirect_stdout

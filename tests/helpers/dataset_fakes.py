@@ -1,7 +1,5 @@
 """Episodes of a data set that no simulator made."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from robospa.action_space import ActionSpace

@@ -1,7 +1,5 @@
 """The oracle in disguise: its motions, sent as end-effector poses or as changes of them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

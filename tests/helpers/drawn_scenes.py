@@ -3,8 +3,6 @@
 A few of each variant by default; `ROBOSPA_SCENES=10000` looks at that many where it says so.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import os

@@ -1,7 +1,5 @@
 """Records and runs without a simulator: the one builder for all tests."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace

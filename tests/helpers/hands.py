@@ -3,8 +3,6 @@
 Nothing is simulated: an object is where a hand has put it, and a touch is a claimed contact.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

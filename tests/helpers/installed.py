@@ -1,7 +1,5 @@
 """An example of the docs as an installed package: its entry points, found as any other's."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

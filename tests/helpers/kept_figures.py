@@ -5,8 +5,6 @@ A set of figures costs one to three seconds, and the same values make the same b
 ones, and only those that the page shows: the files that it links to for papers are empty.
 """
 
-from __future__ import annotations
-
 import hashlib
 import pickle
 import shutil

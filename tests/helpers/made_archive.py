@@ -5,8 +5,6 @@ of our built-in objects, which were chosen within the official bounds. Meshes ar
 than metres and turned as official ones are, so that scale and frame matter.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import math

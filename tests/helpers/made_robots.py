@@ -1,7 +1,5 @@
 """Stand-ins of the official robots: URDF files with the official joints, our shapes as meshes."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

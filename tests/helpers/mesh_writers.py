@@ -1,7 +1,5 @@
 """Small GLB and OBJ files, written byte by byte, so that tests can also write broken ones."""
 
-from __future__ import annotations
-
 import io
 import json
 import struct

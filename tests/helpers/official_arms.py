@@ -3,8 +3,6 @@
 Kept apart from `robospa.harness.robots` on purpose: it is what those modules are held against.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 Q = "1.5707963267948966"

@@ -4,8 +4,6 @@ Where a rule has no number of ours in it, a subtask is done on one side of the o
 not on the other. Nothing is held here: objects are laid where they are asked to be.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

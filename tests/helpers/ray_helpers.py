@@ -1,7 +1,5 @@
 """A Ray cluster of several nodes on this machine, and policies that tell where they ran."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time

@@ -1,7 +1,5 @@
 """A made-up demonstration, and policies that know it by heart but have wrong conventions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A workspace of any robot: objects as placed, both arms at home with open grippers."""
 
-from __future__ import annotations
-
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills.workspace import Workspace

@@ -4,8 +4,6 @@ The goal of every fake trial: the sum of all executed actions' first entry reach
 digit plus one. A policy that sends ones needs (digit + 1) actions.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import signal

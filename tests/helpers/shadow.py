@@ -5,8 +5,6 @@ the cheat that a leaderboard has to stop: it knows the installed package, what `
 and the seed of the run, which its owner read from the run's folder.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import partial
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Submissions with badges, made from fake bundles; entries in any number."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

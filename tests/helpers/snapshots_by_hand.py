@@ -1,7 +1,5 @@
 """Snapshots written by hand: where things are and what the grippers do, without a simulator."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace

@@ -2,8 +2,6 @@
 policy whose answers follow from its seed, and a world that gets stuck in native code when told to.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import time

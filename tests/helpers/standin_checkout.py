@@ -5,8 +5,6 @@ The goal of its only task, Click_Bell_Repeat: the left arm's first joint was tol
 the level says. An action takes 50 physics steps.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

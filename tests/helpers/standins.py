@@ -1,7 +1,5 @@
 """What every stand-in server shares, and the observation that each of them is shown."""
 
-from __future__ import annotations
-
 import base64
 import contextlib
 import json

@@ -1,7 +1,5 @@
 """Small data sets with real pictures, made without a simulator."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A robot whose arms have different joint counts: six left, seven right."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from world_scenes import READY

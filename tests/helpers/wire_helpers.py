@@ -1,7 +1,5 @@
 """Policies, observations and a scripted server for the wire's tests."""
 
-from __future__ import annotations
-
 import contextlib
 import threading
 from collections.abc import Iterator, Sequence

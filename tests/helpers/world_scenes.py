@@ -1,7 +1,5 @@
 """Small scenes of blocks for the tests of the world."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One bundle for all tests that forge it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

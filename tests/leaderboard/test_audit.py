@@ -1,7 +1,5 @@
 """What the audit of a run finds suspicious, and what not."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from functools import partial

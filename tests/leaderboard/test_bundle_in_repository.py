@@ -1,7 +1,5 @@
 """Bundles that lie in the repository: handed in, completed, shown, refused."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """The model card: a template to fill in, every field checked."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from copy import deepcopy

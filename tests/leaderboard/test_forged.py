@@ -4,8 +4,6 @@ Every forger here knows our code: where that makes sense, all hashes and the cha
 again after the change, so that the rule in question is what catches it.
 """
 
-from __future__ import annotations
-
 import json
 import stat
 import struct

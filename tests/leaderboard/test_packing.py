@@ -1,7 +1,5 @@
 """Packing: what enters, what stays at home, and what is refused with its reason."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 from collections.abc import Callable, Sequence

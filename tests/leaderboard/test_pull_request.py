@@ -1,7 +1,5 @@
 """What continuous integration makes of a pull request: from changed paths to evidence."""
 
-from __future__ import annotations
-
 import http.server
 import json
 import re

@@ -1,7 +1,5 @@
 """Which entries of the leaderboard are ranked against which: never the paper's against ours."""
 
-from __future__ import annotations
-
 import html
 import itertools
 import json

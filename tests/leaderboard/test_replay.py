@@ -1,7 +1,5 @@
 """Replay: honest bundles hold, forgeries that pass level 1 do not, other builds are told apart."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

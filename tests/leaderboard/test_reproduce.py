@@ -1,7 +1,5 @@
 """Blocks are planned so that a lie shows, and runs on hidden scenes are held against the claim."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from functools import partial

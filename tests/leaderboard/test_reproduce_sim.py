@@ -3,8 +3,6 @@
 Expert-checked hidden seeds, real bundles, policies behind real servers.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from copy import deepcopy
 from functools import partial

@@ -1,7 +1,5 @@
 """The bundles of this repository are valid by the rules of this commit."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from itertools import islice
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The leaderboard's pages: what they say, that text stays text, and which folders are refused."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections.abc import Callable

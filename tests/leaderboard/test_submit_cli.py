@@ -1,7 +1,5 @@
 """`robospa submit` from the outside: a fake world, real workers, a real server."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from pathlib import Path

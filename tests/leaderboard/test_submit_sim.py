@@ -1,7 +1,5 @@
 """The real simulator: a run is packed, filmed by playing it again, and replayed to the bit."""
 
-from __future__ import annotations
-
 import json
 from copy import deepcopy
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Stored actions: the same bits come back, nothing else is read, and they take their time."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

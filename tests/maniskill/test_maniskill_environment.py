@@ -1,7 +1,5 @@
 """The tasks as ManiSkill's environments, with ManiSkill itself. `make test-maniskill` runs it."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 from functools import partial

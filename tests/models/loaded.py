@@ -7,8 +7,6 @@ The file OUT has every column and camera, `chunks`: the four actions from every 
 which of them lie beyond the episode, and `about`, a JSON text: tasks and statistics.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys

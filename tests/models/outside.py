@@ -1,7 +1,5 @@
 """The models' Python, which `make test-models` makes: programs and policy servers in it."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import subprocess

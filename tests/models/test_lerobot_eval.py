@@ -1,7 +1,5 @@
 """LeRobot's own evaluation, with a tiny policy, on our tasks. `make test-models` runs it."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from pathlib import Path

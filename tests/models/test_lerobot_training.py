@@ -1,8 +1,6 @@
 """LeRobot's own trainer on a dataset of ours, and its checkpoint in our server: the commands of
 docs/policies/lerobot.md, with a small ACT and two steps. `make test-models` runs it."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -4,8 +4,6 @@ Not part of the default tests: `make test-models` makes their environment (Pytho
 this. ROBOSPA_MODELS_PYTHON names its interpreter.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

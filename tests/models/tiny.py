@@ -9,8 +9,6 @@ python tiny.py noise                 which of torch's random functions follow th
 functions are replaced by smaller ones while it is made and loaded.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys

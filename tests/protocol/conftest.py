@@ -1,7 +1,5 @@
 """Settings and fixture of the wire's tests."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 

@@ -1,7 +1,5 @@
 """When the batcher waits, by hand; and what becomes of calls that go wrong."""
 
-from __future__ import annotations
-
 import asyncio
 import statistics
 from collections.abc import Callable, Coroutine, Sequence

@@ -1,7 +1,5 @@
 """Calls of skills: what is taken, what is refused in one sentence, and the same over the wire."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The client against servers that misbehave in known ways."""
 
-from __future__ import annotations
-
 import contextlib
 import socket
 import struct

@@ -1,7 +1,5 @@
 """The codec: everything survives the round trip, and no bytes crash or over-allocate it."""
 
-from __future__ import annotations
-
 import struct
 import tracemalloc
 from typing import Any

@@ -1,7 +1,5 @@
 """The conformance suite passes what is right and notices what is wrong."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """An exception of a policy is told by type, text and the line of its author's code."""
 
-from __future__ import annotations
-
 import json
 import logging
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Who is let in, and that whatever a client does, it harms only itself."""
 
-from __future__ import annotations
-
 import base64
 import contextlib
 import http.client

@@ -1,7 +1,5 @@
 """Who a policy server is: what stays the same in its greeting, and what tells another one."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Messages: round trips, strict types, tolerated additions, versions, specs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

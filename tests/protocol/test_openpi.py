@@ -1,7 +1,5 @@
 """openpi's real client against our server."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The server: errors that leave it usable, and sessions that are kept apart."""
 
-from __future__ import annotations
-
 import json
 import socket
 import threading

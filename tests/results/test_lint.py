@@ -1,7 +1,5 @@
 """Each rule of lint finds what it is for, and nothing in a clean run."""
 
-from __future__ import annotations
-
 import builtins
 import csv
 from dataclasses import replace

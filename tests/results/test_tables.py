@@ -1,7 +1,5 @@
 """Tables as Markdown, LaTeX, HTML and CSV: whole, and safe with any name from outside."""
 
-from __future__ import annotations
-
 import csv
 import io
 import re

@@ -1,7 +1,5 @@
 """Typed objects from values of outside, and the sentence about each kind of refusal."""
 
-from __future__ import annotations
-
 import threading
 import time
 import tomllib

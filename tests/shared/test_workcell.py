@@ -1,7 +1,5 @@
 """The workcell: the head camera's projection and reach, and that robots fit it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a reader calls the objects of a scene."""
 
-from __future__ import annotations
-
 import pytest
 
 from robospa.tasks.catalog import build_scene, tasks

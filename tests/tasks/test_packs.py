@@ -1,7 +1,5 @@
 """Scenes made of a pack's objects; packs and assets of other packages, which replace none here."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

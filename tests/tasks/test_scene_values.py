@@ -1,7 +1,5 @@
 """Facts of a scene: typed in the task, plain JSON in the scene."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import dataclass, replace

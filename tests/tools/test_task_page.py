@@ -1,7 +1,5 @@
 """The page of all tasks: up to date with the catalog, and right in what it says of the levels."""
 
-from __future__ import annotations
-
 import dataclasses
 import io
 import re

@@ -1,7 +1,5 @@
 """Words and objects to the next step: order never matters, unknown words mean something."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

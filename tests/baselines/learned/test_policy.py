@@ -1,8 +1,6 @@
 """What was decided is done on an imagined scene: with numbers that are a little off, after a grasp
 of nothing, by other robots."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

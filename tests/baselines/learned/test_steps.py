@@ -1,7 +1,5 @@
 """Plans read as steps: every plan can be, and its states are where physics leads."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

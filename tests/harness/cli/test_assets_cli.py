@@ -1,7 +1,5 @@
 """`robospa official assets`: what a folder of official assets holds."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`robospa check` from the outside: hints about first actions, and the replay of a file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

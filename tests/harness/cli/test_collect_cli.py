@@ -1,7 +1,5 @@
 """`robospa collect` from the command line: what it prints."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

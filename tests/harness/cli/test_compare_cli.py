@@ -1,7 +1,5 @@
 """`robospa compare` and `robospa report --lint` from the command line."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

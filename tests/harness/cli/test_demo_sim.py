@@ -1,7 +1,5 @@
 """The demo as a user sees it: a server process, a table, a report with a film."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

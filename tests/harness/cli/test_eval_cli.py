@@ -3,8 +3,6 @@
 What is watched or stopped while it runs has a process of its own; the others share this one.
 """
 
-from __future__ import annotations
-
 import itertools
 import json
 import os

@@ -1,7 +1,5 @@
 """`robospa eval --latency`: a run for every latency, then one table and one figure."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

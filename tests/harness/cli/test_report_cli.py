@@ -1,7 +1,5 @@
 """`robospa report`: what it refuses, and the failures of a run with their evidence."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from dataclasses import asdict

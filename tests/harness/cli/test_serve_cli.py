@@ -1,7 +1,5 @@
 """`robospa serve`: options are typed, checked and listed; models are shared, others are not."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """`robospa tasks` and the pictures that it makes."""
 
-from __future__ import annotations
-
 import inspect
 import json
 import socket

@@ -1,7 +1,5 @@
 """Declared latencies, how they are written, drawn and frozen; and how chunks follow each other."""
 
-from __future__ import annotations
-
 import json
 import math
 import threading

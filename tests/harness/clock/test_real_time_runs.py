@@ -1,7 +1,5 @@
 """Runs in real time: settings, manifest, suite, workers, and what they are held against."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

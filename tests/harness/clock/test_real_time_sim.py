@@ -1,7 +1,5 @@
 """Real time in the simulator: without latency nothing changes, and every trial comes again."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

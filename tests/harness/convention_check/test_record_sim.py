@@ -1,7 +1,5 @@
 """What `robospa collect --record` writes is a demonstration that can be replayed."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

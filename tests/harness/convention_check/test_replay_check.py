@@ -1,7 +1,5 @@
 """Every mistake of convention is named; right policies are not accused."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A collection ends with the same bytes whatever happens to it, and refuses what is not its own."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Official recordings become data sets with what they have, marked as such, and nothing more."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The files of LeRobot's versions 3.0 and 2.1, against what their readers expect of them."""
 
-from __future__ import annotations
-
 import io
 import json
 import zipfile

@@ -1,7 +1,5 @@
 """An episode is what its replay shows, and comes out the same every time."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 

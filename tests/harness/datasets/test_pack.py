@@ -1,7 +1,5 @@
 """Packing: the same bytes again, nothing half done, nothing of others removed, flat memory."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import tracemalloc

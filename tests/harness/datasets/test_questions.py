@@ -1,7 +1,5 @@
 """Questions of pointing as a data set. Needs a Vulkan device."""
 
-from __future__ import annotations
-
 import io
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Demonstrations of every kind: which a seed is of, where each is refused, what it leads to."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass, field
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Tasks as Gymnasium environments: trials of the runner, stepped one action at a time."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

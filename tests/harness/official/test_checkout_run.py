@@ -1,7 +1,5 @@
 """A whole run in a stand-in checkout: processes, records, scores, and a suite of its own."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

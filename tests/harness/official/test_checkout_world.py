@@ -1,7 +1,5 @@
 """A stand-in checkout as a world: its scenes, sentences, verdicts and faults."""
 
-from __future__ import annotations
-
 import ast
 import io
 import json

@@ -1,7 +1,5 @@
 """The official world: its parts, suites, settings, and its 11 seconds."""
 
-from __future__ import annotations
-
 import json
 import os
 import pickle

@@ -1,7 +1,5 @@
 """Recordings on disk: which there are, and which scenes can be made again."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A demonstration of ours, in the official layout and without its key, is played again."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Where the user's official assets are, which files belong to a model, and the cache of them."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Convex pieces of meshes, and hollow things that are filled by their hull, task by task."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Hollow models of an archive are as hollow as officially: what is dropped into a bin ends on its
 floor, and pieces are those that SAPIEN's own reader makes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

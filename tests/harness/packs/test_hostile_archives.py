@@ -1,7 +1,5 @@
 """Archives that are broken or mean harm: one sentence each, and nothing is built of them."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

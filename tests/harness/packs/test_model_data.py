@@ -1,7 +1,5 @@
 """The JSON of a model: scale and points, in new and old files; broken ones."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

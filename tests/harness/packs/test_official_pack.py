@@ -1,7 +1,5 @@
 """Models of a made-up archive: shape, size, frames and grasps as tasks need them."""
 
-from __future__ import annotations
-
 import json
 import math
 import struct

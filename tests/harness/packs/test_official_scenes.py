@@ -1,7 +1,5 @@
 """Scenes of a made-up archive in the simulator: solved by the expert, drawn with their pictures."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Vendors' meshes of robots: every link where the URDF has it, and nothing that is drawn twice."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """URDF files: links and joints, and what is refused."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The real simulator: a film made afterwards shows, to the pixel, what the trial looked like."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

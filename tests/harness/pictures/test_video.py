@@ -1,7 +1,5 @@
 """Videos: playable everywhere, one frame every fifth of a simulated second."""
 
-from __future__ import annotations
-
 import io
 from dataclasses import dataclass, field
 from typing import Any

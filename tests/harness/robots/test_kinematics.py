@@ -1,7 +1,5 @@
 """Forward and inverse kinematics of the arms, from a closed-form start and numerical."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The five robots are the ones that the official simulator loads."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from official_arms import ARMS, description

@@ -1,7 +1,5 @@
 """`robospa.evaluate`: every kind of policy that it takes, in a fake world and in the real one."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What a policy causes counts, and what it may have caused is bounded over all resumes."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Mapping
 from dataclasses import replace

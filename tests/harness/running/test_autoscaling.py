@@ -1,7 +1,5 @@
 """More workers than cores only as long as that helps."""
 
-from __future__ import annotations
-
 import pytest
 from fake_runs import trial_record
 

@@ -1,7 +1,5 @@
 """A run goes on with the policy that it began with, and with no other behind the same URL."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace

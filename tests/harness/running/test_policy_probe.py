@@ -1,7 +1,5 @@
 """One policy for all tasks or one for each, and what a run says about them before it starts."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

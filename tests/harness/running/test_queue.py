@@ -1,7 +1,5 @@
 """Which trial of a base task comes next, and what a trial is expected to take."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -4,8 +4,6 @@ Starting Ray takes most of the time, so one cluster serves all tests, and the te
 its nodes comes last.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

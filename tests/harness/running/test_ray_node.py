@@ -1,7 +1,5 @@
 """What runs on a node of a Ray cluster, without Ray."""
 
-from __future__ import annotations
-
 import pickle
 import tempfile
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The real simulator on a Ray cluster of its own: records and traces come back whole."""
 
-from __future__ import annotations
-
 from contextlib import closing, suppress
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Records survive kills at any byte; corruption and contradictions are named."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import fcntl

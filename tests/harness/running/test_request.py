@@ -1,7 +1,5 @@
 """From settings to what the driver runs."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,8 +1,6 @@
 """Films follow the run and nothing that goes wrong with them ends it; what becomes of one film; the
 films of a whole run: made during it, after it, by a resume, or long afterwards on demand."""
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The real simulator: the number of workers does not enter a record."""
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import replace
 from pathlib import Path

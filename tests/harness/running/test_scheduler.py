@@ -1,7 +1,5 @@
 """Which server gets which trial: driven by a small simulation, without processes or clocks."""
 
-from __future__ import annotations
-
 import heapq
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence

@@ -4,8 +4,6 @@ Two runs with real worker processes and real sockets, one server and three trial
 then what stops a run, each by itself.
 """
 
-from __future__ import annotations
-
 import re
 import struct
 from collections.abc import Iterable

@@ -5,8 +5,6 @@ actions equal to those of an undisturbed run, and nothing else in its folder. Wh
 from a seed, its moments also from the machine. `ROBOSPA_SOAK=200` makes that many interruptions.
 """
 
-from __future__ import annotations
-
 import os
 import random
 import signal

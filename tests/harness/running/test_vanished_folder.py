@@ -1,7 +1,5 @@
 """A run's folder that is moved, deleted or replaced while the run goes on stops the run."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a driver notices: a policy that always fails alike, or speaks another language."""
 
-from __future__ import annotations
-
 from fake_runs import record, trial_record
 
 from robospa.harness.running.attempts import FIRST, IN_A_ROW, ErrorVerdict, ErrorWatch, ProblemWatch

@@ -1,7 +1,5 @@
 """Sweeps try exactly the seeds that they need, and lose none that has finished."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from concurrent.futures import Future
 from pathlib import Path

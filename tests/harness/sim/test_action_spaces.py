@@ -1,7 +1,5 @@
 """The same motions in every action space, and actions that no robot could follow."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

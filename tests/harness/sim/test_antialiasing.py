@@ -1,7 +1,5 @@
 """What becomes of a picture that was taken: its parts, sky and smoothed edges. Needs no device."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Clutter in the simulator: heavy, at rest, in no one's way, and noticed when it is moved."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

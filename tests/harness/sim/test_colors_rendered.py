@@ -1,7 +1,5 @@
 """Named colours and bodies of many materials as the head camera shows them."""
 
-from __future__ import annotations
-
 import itertools
 from functools import cache
 

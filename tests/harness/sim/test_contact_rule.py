@@ -1,7 +1,5 @@
 """What counts as a press in physics: the official meaning of contact, and the strict one."""
 
-from __future__ import annotations
-
 import math
 from itertools import product
 from typing import Any

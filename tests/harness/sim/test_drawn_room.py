@@ -1,7 +1,5 @@
 """Walls, tables and lights of randomised scenes. Needs a Vulkan device."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

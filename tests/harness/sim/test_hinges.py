@@ -1,7 +1,5 @@
 """Doors in the world: they swing, stay where they are left, are reported, drawn and repeatable."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

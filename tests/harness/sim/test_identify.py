@@ -1,7 +1,5 @@
 """What each pixel of a picture shows. Needs a Vulkan device."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from world_scenes import go_on, joint_action, run_digest, two_blocks

@@ -1,7 +1,5 @@
 """The closed form of rest-to-rest motion, against hand-checked numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -5,8 +5,6 @@
 draws them anew, after a change that is meant to be seen: look at them then.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

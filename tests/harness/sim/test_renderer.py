@@ -1,7 +1,5 @@
 """What the cameras see. Needs a Vulkan device."""
 
-from __future__ import annotations
-
 import math
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """The SAPIEN world: repeatable to the bit, official timing, honest state."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """An arm's own links stay out of table and objects; ways around what stands close beside."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The skills with the arms and grippers of every robot."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import product

@@ -1,7 +1,5 @@
 """Grasps: reach, neighbours, walls, and what has fallen over; which a hand that places takes."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

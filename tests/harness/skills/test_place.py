@@ -1,7 +1,5 @@
 """Letting go of what was placed, of what turned in the hand, and of what hangs, docks or pours."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

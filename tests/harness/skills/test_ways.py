@@ -1,7 +1,5 @@
 """Both arms at once where they stay apart, and no stop where a straight line passes by."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Textures as pure functions, and those of a user's folder."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 

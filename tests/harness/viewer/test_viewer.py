@@ -1,7 +1,5 @@
 """What is shown of a trial at which time, and what it looks like in the browser."""
 
-from __future__ import annotations
-
 import time
 import urllib.request
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Comparisons of small runs that can be worked out by hand."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

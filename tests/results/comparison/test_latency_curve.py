@@ -1,7 +1,5 @@
 """Success against latency: pairs, the latency at which half is gone, table and figure."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

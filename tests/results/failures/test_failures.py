@@ -1,7 +1,5 @@
 """Failure types from events written by hand: one rule a test."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The published results are whole, and every printed cell is accounted for."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections import Counter

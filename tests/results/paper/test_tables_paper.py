@@ -1,7 +1,5 @@
 """The paper's tables from published models and runs; what is missing is shown, never averaged."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Which films a run has, and which it owes."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

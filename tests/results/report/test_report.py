@@ -1,7 +1,5 @@
 """A run's folder becomes tables and a page; text from outside stays text."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace

@@ -3,8 +3,6 @@
 Needs Chromium: run with `-m browser`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Not yet run is not missing: a run in progress shows what has finished, with intervals."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator

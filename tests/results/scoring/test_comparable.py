@@ -1,7 +1,5 @@
 """Scores over the trials that compare: by lead, by gap, asked again after the cue was hidden."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

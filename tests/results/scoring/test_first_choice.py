@@ -1,7 +1,5 @@
 """What counts as a first choice, from events written by hand."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,8 +1,6 @@
 """Grounding and execution: of scripted policies that choose right with probability p and carry that
 out with probability q, both are recovered in every category."""
 
-from __future__ import annotations
-
 import random
 from typing import Any
 

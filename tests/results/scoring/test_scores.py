@@ -1,7 +1,5 @@
 """Scores of small runs that can be computed by hand."""
 
-from __future__ import annotations
-
 import csv
 import json
 from dataclasses import replace

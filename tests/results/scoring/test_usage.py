@@ -1,7 +1,5 @@
 """What runs have used of what is paid for, summed from their records."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

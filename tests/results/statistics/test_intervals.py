@@ -1,7 +1,5 @@
 """Intervals against numbers that can be checked by hand or against other software."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import cache

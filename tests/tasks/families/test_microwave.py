@@ -1,7 +1,5 @@
 """Click_Bell_Open_Microwave_Place_Object: where things stand, and its loopholes."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import Counter

@@ -3,8 +3,6 @@
 Nothing moves by physics here (`teleport`): half a plan must not do, nor idling, nor a wrong object.
 """
 
-from __future__ import annotations
-
 import pytest
 from drawn_scenes import FIRST_SEED, SCENES, each_task, kept
 from teleport import Teleport

@@ -1,7 +1,5 @@
 """Scenes of the procedural tasks: what lies where, and that nothing gives the answer away."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import Counter

@@ -3,8 +3,6 @@
 `ROBOSPA_SCENES=10000` looks at that many scenes of each.
 """
 
-from __future__ import annotations
-
 import ast
 import json
 from dataclasses import replace

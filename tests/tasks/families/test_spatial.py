@@ -1,7 +1,5 @@
 """Scenes and sentences of the tasks that ask for one object: true, unique, uniform."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import re

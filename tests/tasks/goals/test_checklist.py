@@ -1,7 +1,5 @@
 """Checklists: counting, letting go, latching, returning, bins, cycles, and the noted order."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

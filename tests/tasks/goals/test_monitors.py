@@ -1,7 +1,5 @@
 """What the failure analysis is told: grasp attempts, lifts and drops, clutter that was moved."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 
 import pytest

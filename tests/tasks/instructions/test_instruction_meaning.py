@@ -5,8 +5,6 @@ few regular expressions tell what they mean. What comes out must be what the sce
 the spatial tasks, must single out the target from where the objects lie.
 """
 
-from __future__ import annotations
-
 import itertools
 import re
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Instruction templates: counts, disjoint splits, clean English, and the sentence of a trial."""
 
-from __future__ import annotations
-
 import itertools
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Randomised scenes: parts, their names and streams, and what they leave alone."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import math

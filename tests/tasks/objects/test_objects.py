@@ -1,7 +1,5 @@
 """The object library: every look builds, and its numbers are true of its shapes."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The object library in the simulator: things stand still, and what is grasped comes along."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Which official model each look of our assets stands for."""
 
-from __future__ import annotations
-
 import pytest
 
 from robospa.tasks import catalog

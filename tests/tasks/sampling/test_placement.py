@@ -1,7 +1,5 @@
 """Layouts: areas, bounded scatter, the pool."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
