@@ -287,7 +287,7 @@ class Belief:
                 if self.held[arm] is None and new < SHUT < old and target is not None:
                     self._close(arm, row, target)
                 elif (hold := self.held[arm]) is not None and new > old + 0.02:
-                    self._put(hold.number, self._end(arm, row) * hold.offset)
+                    self.put(hold.number, self._end(arm, row) * hold.offset)
                     self.held[arm] = None
             before = row
         self.last = before
@@ -296,11 +296,11 @@ class Belief:
             self.misses[number] = self.misses.get(number, 0) + 1
         for arm, hold in enumerate(self.held):
             if hold is not None and hold.number in empty:
-                self._put(hold.number, hold.before)
+                self.put(hold.number, hold.before)
                 self.held[arm] = None
             elif hold is not None:
                 end = _pose(observation["ee"][arm].astype(float).tolist())
-                self._put(hold.number, end * hold.offset)
+                self.put(hold.number, end * hold.offset)
 
     def _shut(self, arm: int, observation: Observation) -> bool:
         """Whether the fingers of an arm that should hold something came together."""
@@ -335,7 +335,8 @@ class Belief:
         offset = end.inverse() * Pose((px, py, pz), pose.rotation)
         self.held[arm] = Grip(target, offset, best.width, pose)
 
-    def _put(self, number: int, pose: Pose) -> None:
+    def put(self, number: int, pose: Pose) -> None:
+        """Object `number` is at `pose` now."""
         self.poses[number] = pose
         items = list(self.state.objects)
         item = items[number]

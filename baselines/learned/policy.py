@@ -5,6 +5,7 @@ step that did not do what it should is done again.
 
     robospa serve learned
     robospa serve learned --option eyes=no
+    robospa serve learned --option action=skill
 
 Without eyes it is told of the objects as numbers, and privileged: the same networks but for those
 that see. So both rows side by side tell what cannot be seen from what cannot be learned.
@@ -14,24 +15,32 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from robospa.baselines.learned.act import Belief, Rows, calls_of, possible, told
-from robospa.baselines.learned.steps import Seen, State, Step, after
+from robospa.baselines.learned.steps import Seen, State, Step, after, pose_of
 from robospa.extras import need
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.skills.expert import Expert
 from robospa.observation import CameraSpec, Observation
 from robospa.protocol.options import option
-from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.protocol.policy import SKILL, PolicySpec, TrialInfo
+from robospa.tasks import plan as calls
+from robospa.workcell import HEIGHT, TABLE_TOP, WIDTH, WORKCELL
 
 Look = Callable[[Observation], list[Seen]]
 """What is seen in an observation."""
+Call = dict[str, object]
+"""A call of a skill (`robospa.protocol.calls`)."""
+MIDDLE, INSIDE = (0.0, 0.0, 1.0), (0.5, 0.3, 2.0)
+"""Where a thing is pointed at, in halves of its box from the middle of its underside; and a bin
+beside the table, of which the far side of its mouth is seen."""
+NAMES = {"RaiseLower": "raise_lower"}
 Decide = Callable[[State, str], Step]
 """The next step, from all that is known and the sentence."""
 REPEATED = ("press", "lift", "stamp", "hit")
@@ -86,22 +95,27 @@ class Learned:
             rows = self._expert.next(belief.snapshot(observation, self._scene))
             if not self._expert.finished:
                 return rows
-            self._end(belief)
+            self._end(belief, self._expert.failures)
+            self._expert = None
         last = observation["state"] if belief.last is None else belief.last
         return np.repeat(np.asarray(last, np.float32)[None], IDLE, axis=0)
 
     def _begin(self, belief: Belief, observation: Observation) -> None:
         """Decide what is next; nothing if all is done."""
-        if self._tries == 0 or not all(possible(step, belief.state) for step in self._steps):
-            self._tries, self._steps = 0, self._chain(belief.state)  # what it was about is gone
-        calls = calls_of(self._steps, belief.state)
-        if not calls:
+        found = self._decided(belief)
+        if not found:
             return
         self._scene = belief.scene()
         snapshot = belief.snapshot(observation, self._scene)
-        self._expert = Expert(self._scene, snapshot, calls)
+        self._expert = Expert(self._scene, snapshot, found)
         held = [None if hold is None else str(hold.number) for hold in belief.held]
         self._expert.workspace.held = held
+
+    def _decided(self, belief: Belief) -> list[object]:
+        """What is done next, in a plan's calls: new steps, or those that failed once more."""
+        if self._tries == 0 or not all(possible(step, belief.state) for step in self._steps):
+            self._tries, self._steps = 0, self._chain(belief.state)  # what it was about is gone
+        return calls_of(self._steps, belief.state)
 
     def _chain(self, state: State) -> list[Step]:
         steps = [self._next(state)]
@@ -120,14 +134,10 @@ class Learned:
         step = Step("done") if picked else self._decide(state, self._sentence)
         return step if possible(step, state) else Step("done")
 
-    def _end(self, belief: Belief) -> None:
+    def _end(self, belief: Belief, failures: Sequence[str]) -> None:
         """Note what came of the steps; try again what failed."""
-        assert self._expert is not None
-        failed = "; ".join(
-            filter(None, (self._missed(belief, self._steps[0]), *self._expert.failures))
-        )
+        failed = "; ".join(filter(None, (self._missed(belief, self._steps[0]), *failures)))
         self.log += [(step, failed) for step in self._steps]
-        self._expert = None
         self._tries += 1
         if failed and self._tries < TRIES:
             return
@@ -162,6 +172,79 @@ class Learned:
         return ""
 
 
+class LearnedCalls(Learned):
+    """The same in calls of skills, which point at what it sees: it decides, and does not act."""
+
+    _said = 0
+
+    def infer(self, observation: Observation) -> list[Call]:  # type: ignore[override]
+        """The calls of the next steps."""
+        if self._robot is None:
+            raise RuntimeError("the policy was asked for calls before a reset")
+        seen = self._look(observation)
+        if self.belief is None:
+            self.belief = Belief(self._robot, seen)
+        elif self._steps:
+            self._take_over(self.belief, observation["calls"][-self._said :], seen)
+        found = in_points(self._decided(self.belief), self.belief.state)
+        self._said = len(found)
+        return found or [{"skill": "done"}]
+
+    def _take_over(self, belief: Belief, said: Sequence[Call], seen: list[Seen]) -> None:
+        """What came of the calls `said`, by their feedback and by what is seen."""
+        failures = [str(call["feedback"]) for call in said if call["feedback"] != "done"]
+        before = state = belief.state
+        for step in self._steps if not failures else ():
+            state = after(state, step)
+        for number, (old, new) in enumerate(zip(before.objects, state.objects, strict=True)):
+            if old.now != new.now:
+                belief.put(number, pose_of(new.now))
+        belief.look(seen)
+        self._end(belief, failures)
+
+    def _missed(self, belief: Belief, step: Step) -> str:
+        return "" if step.type == "pick" else super()._missed(belief, step)
+
+
+def in_points(found: Sequence[object], state: State) -> list[Call]:
+    """A plan's calls on objects named by number as calls at the pixels where these are seen."""
+    at: dict[str, tuple[float, float]] = {}
+    lies: dict[str, tuple[float, float, float]] = {}
+    for number, item in enumerate(state.objects):
+        x, y, z = item.now.place
+        lies[str(number)] = (x, y, item.now.turn)
+        shares = MIDDLE if z > TABLE_TOP - 0.1 else INSIDE
+        spot = np.array(item.now.place) + np.multiply(item.now.half, shares)
+        u, v = WORKCELL.head.pixel(*(np.array(n) for n in spot))
+        at[str(number)] = (min(max(float(u) / WIDTH, 0), 1), min(max(float(v) / HEIGHT, 0), 1))
+    said: list[Call] = []
+    for call in found:
+        given = vars(call)
+        own = str(given.get("object", given.get("tool", "")))
+        name = NAMES.get(type(call).__name__, type(call).__name__.lower())
+        one: Call = {"skill": name}
+        one |= {key: given[key] for key in ("arm", "arms", "seconds", "times") if given.get(key)}
+        goal = given.get("on") or given.get("into")
+        if own:
+            one["at"] = at[own]
+        if isinstance(call, calls.Place):
+            one["height"] = call.drop
+            if goal is None:  # beside where it lies
+                x, y, turn = lies[own]
+                one["offset"] = (call.position[0] - x, call.position[1] - y)
+                if call.yaw is not None:
+                    one["turn"] = math.degrees(math.remainder(call.yaw - turn, 2 * math.pi))
+                lies[own] = (*call.position[:2], turn if call.yaw is None else call.yaw)
+        if isinstance(call, calls.Place | calls.Drop):
+            one["at"] = at[str(goal or own)]
+        elif goal is not None:
+            one["to"] = at[str(goal)]
+        elif isinstance(call, calls.Hit):
+            one["to"] = [at[target] for target in call.targets]
+        said.append(one)
+    return said
+
+
 def _alike(one: Step, other: Step) -> bool:
     """Whether both steps are done in one go."""
     same = one.type != "stamp" or one.destination == other.destination
@@ -178,6 +261,7 @@ class LearnedOptions:
 
     path: str = option("", "folder of weights of robospa learn; empty for those that are shipped")
     eyes: bool = option(True, "no: told of the objects as numbers (privileged)")
+    action: str = option("joint", "skill: calls of skills at what it sees", ("joint", SKILL))
 
 
 class Learners:
@@ -197,8 +281,10 @@ class Learners:
         if options.eyes:
             eyes = perceive.load(folder)
             self._look = lambda observation: eyes.look(observation["images"]["head"])
+        self._kind = LearnedCalls if options.action == SKILL else Learned
         self.spec = PolicySpec(
             "learned" if options.eyes else "learned:eyes-off",
+            action=options.action,
             cameras=(CameraSpec("head"),) if options.eyes else (),
             state="measured",
             seeded=True,
@@ -208,7 +294,7 @@ class Learners:
 
     def __call__(self) -> Learned:
         """A policy for one connection."""
-        return Learned(self.spec, self._look, self._decide)
+        return self._kind(self.spec, self._look, self._decide)
 
 
 def create(options: LearnedOptions) -> Learners:

@@ -10,17 +10,18 @@ import numpy as np
 import pytest
 
 from robospa.baselines.learned.act import Belief, possible, told
-from robospa.baselines.learned.policy import Learned, LearnedOptions, create
+from robospa.baselines.learned.policy import Learned, LearnedCalls, LearnedOptions, create
 from robospa.baselines.learned.steps import Seen, State, Step, Tracked, labelled
 from robospa.harness.robots import embodiment
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import run_trial
-from robospa.observation import Observation
+from robospa.observation import CameraSpec, Observation
 from robospa.protocol.policy import PolicySpec
 from robospa.tasks.catalog import build_scene
 from robospa.trial import REFERENCE, TrialKey
 
 SPEC = PolicySpec("given", cameras=(), state="measured", environment_state=True)
+HEAD = CameraSpec("head", 320, 240)
 SEED = 1_500_000
 
 
@@ -49,13 +50,19 @@ def numbers(steps: list[Step], truth: State) -> Callable[[State, str], Step]:
 
 
 def solves(
-    name: str, level: int, robot: str = REFERENCE, look: Callable[[Observation], list[Seen]] = told
+    name: str,
+    level: int,
+    robot: str = REFERENCE,
+    look: Callable[[Observation], list[Seen]] = told,
+    kind: type[Learned] = Learned,
 ) -> Learned:
     """The policy, after a trial in which it met the goal with the plan's own steps."""
     key = TrialKey(name, level, SEED, robot, split="train")
     states = labelled(build_scene(name, level, SEED, robot))
-    policy = Learned(SPEC, look, numbers([step for _, step in states], states[-1][0]))
-    record = run_trial(SapienWorld(render=False), policy, key, policy_seed=0)
+    calls = kind is LearnedCalls
+    spec = replace(SPEC, action="skill", cameras=(HEAD,)) if calls else SPEC
+    policy = kind(spec, look, numbers([step for _, step in states], states[-1][0]))
+    record = run_trial(SapienWorld(render=calls), policy, key, policy_seed=0)
     assert record.success, (record.end, policy.log)
     return policy
 
@@ -84,6 +91,20 @@ def test_steps_are_done_with_what_is_seen_some_millimetres_off(name: str, level:
         return found
 
     solves(name, level, look=blurred)
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize(
+    ("name", "level"),
+    [
+        ("Put_Bottles_Dustbin", 3),
+        ("Hit_Blocks_Hammer_Order", 3),
+        ("Remember_Orientation_Restore", 2),
+        ("Stamp_Seals_Press_Stapler", 2),
+    ],
+)
+def test_the_same_steps_are_said_in_calls(name: str, level: int) -> None:
+    solves(name, level, kind=LearnedCalls)
 
 
 @pytest.mark.sim
