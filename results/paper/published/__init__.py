@@ -233,9 +233,12 @@ class _Models:
     rows: Mapping[str, PublishedModel]
 
 
+def _content(name: str) -> object:
+    return json.loads(files(__name__).joinpath(name).read_text(encoding="utf-8"))
+
+
 def _read(schema: type[T], name: str) -> T:
-    text = files(__name__).joinpath(name).read_text(encoding="utf-8")
-    return read(schema, json.loads(text), name)
+    return read(schema, _content(name), name)
 
 
 @cache
