@@ -21,14 +21,8 @@ from robospa.clients.dialect import (
     dialects,
     explain_error,
 )
+from robospa.protocol import errors
 from robospa.protocol.client import Identity, RemotePolicy, WireClient
-from robospa.protocol.errors import (
-    HandshakeError,
-    ServerError,
-    TransportError,
-    Unauthorized,
-    without_secrets,
-)
 from robospa.protocol.options import read_options, url_options
 from robospa.protocol.transport import Timeouts
 
@@ -43,7 +37,7 @@ def find_endpoint(url: str, options: Mapping[str, object] | None = None) -> Endp
 
     Raises ValueError for an unknown scheme or a URL without host.
     """
-    shown = without_secrets(url)
+    shown = errors.without_secrets(url)
     parts = urlsplit(url)
     if "@" in parts.netloc:
         raise ValueError(f"{shown!r} holds a user or password, which is never used: {TOKEN}")
@@ -60,7 +54,9 @@ def find_endpoint(url: str, options: Mapping[str, object] | None = None) -> Endp
         port = parts.port or usual
         given = {**(options or {}), **url_options(parts.query)}
     except ValueError as error:
-        raise ValueError(f"{shown!r} cannot be read: {without_secrets(str(error))}") from error
+        raise ValueError(
+            f"{shown!r} cannot be read: {errors.without_secrets(str(error))}"
+        ) from error
     return Endpoint(url, dialect, parts.scheme, parts.hostname, port, parts.path, given)
 
 
@@ -83,7 +79,7 @@ def _prepare(url: str, options: Mapping[str, object] | None) -> tuple[Endpoint, 
     try:
         return endpoint, read_options(endpoint.dialect.options, endpoint.options)
     except ValueError as error:
-        raise ValueError(f"{without_secrets(url)!r}: {error}") from error
+        raise ValueError(f"{errors.without_secrets(url)!r}: {error}") from error
 
 
 def connect(
@@ -127,9 +123,9 @@ def connect(
             if params.redirects:
                 session.hello["redirected_to"] = params.redirects[-1]
             return session
-        except Unauthorized as error:
-            raise Unauthorized(f"{error}; {TOKEN}") from error.__cause__
-        except (HandshakeError, TransportError, ServerError) as error:
+        except errors.Unauthorized as error:
+            raise errors.Unauthorized(f"{error}; {TOKEN}") from error.__cause__
+        except (errors.HandshakeError, errors.TransportError, errors.ServerError) as error:
             # Once it has spoken this dialect, trouble is trouble and no sign of another one.
             if known or isinstance(error.__cause__, ConnectionRefusedError):
                 raise

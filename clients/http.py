@@ -22,17 +22,7 @@ from numpy.typing import NDArray
 
 from robospa.clients.chunks import as_chunk, plain_dtype
 from robospa.clients.dialect import ConnectionParams, StatelessSession, explain_error
-from robospa.protocol.errors import (
-    CallTimeout,
-    ConnectFailed,
-    ConnectionLost,
-    HandshakeError,
-    ProtocolViolation,
-    ServerError,
-    Unauthorized,
-    printable,
-    without_secrets,
-)
+from robospa.protocol import errors
 from robospa.protocol.messages import BUSY
 from robospa.protocol.policy import PolicySpec
 from robospa.protocol.transport import MOVED, NotYet, connect_until
@@ -79,19 +69,19 @@ class JsonServer:
         def ask() -> None:
             try:
                 self.request("GET", path, None, timeout)
-            except ServerError as error:
+            except errors.ServerError as error:
                 if error.code != BUSY:
                     raise
-                raise NotYet(ConnectFailed(error.message)) from error
+                raise NotYet(errors.ConnectFailed(error.message)) from error
 
         try:
             connect_until(self.url, self._wait, ask)
-        except ServerError as error:
+        except errors.ServerError as error:
             if error.code in WRONG_ADDRESS:
-                raise HandshakeError(
+                raise errors.HandshakeError(
                     f"{self.url}{path} {WRONG_ADDRESS[error.code]} ({error.code}: {error.message})"
                 ) from error
-        except ProtocolViolation:
+        except errors.ProtocolViolation:
             return  # it answered, only not in JSON
 
     def request(self, method: str, path: str, body: bytes | None, timeout: float) -> object:
@@ -108,12 +98,14 @@ class JsonServer:
                 f"{self.url}{path} answered HTTP {status}: {_reason(data) or reason}; start the "
                 "policy server behind it, or allow more time"
             )
-            raise ServerError(BUSY, text, True)
+            raise errors.ServerError(BUSY, text, True)
         if status in (http.HTTPStatus.UNAUTHORIZED, http.HTTPStatus.FORBIDDEN):
-            raise Unauthorized(f"{self.url}{path} refused the request: {_reason(data) or reason}")
+            raise errors.Unauthorized(
+                f"{self.url}{path} refused the request: {_reason(data) or reason}"
+            )
         if status != http.HTTPStatus.OK:
             text = _reason(data) or reason
-            raise ServerError(f"HTTP {status}", text, status >= 500, f"{self.url}{path}")
+            raise errors.ServerError(f"HTTP {status}", text, status >= 500, f"{self.url}{path}")
         return self._decoded(path, data)
 
     def _answer(
@@ -152,7 +144,7 @@ class JsonServer:
         sock = self._connection.sock
         if has_unread_bytes(sock):
             self.close()
-            raise ProtocolViolation(f"{self.url} sent data that was not requested")
+            raise errors.ProtocolViolation(f"{self.url} sent data that was not requested")
         left = max(until - time.monotonic(), 1e-3)
         sock.settimeout(left)
         # A time limit of a socket is that of a single byte: a server that sends one now and then
@@ -170,10 +162,10 @@ class JsonServer:
                     raise TimeoutError
                 if response.status in MOVED:
                     self.close()
-                    target = without_secrets(response.headers.get("Location") or "nowhere")
-                    raise HandshakeError(
-                        f"{self.url}{path} redirects to {printable(target, 200)}, which is not "
-                        "followed: if that is the policy server, give its address"
+                    target = errors.without_secrets(response.headers.get("Location") or "nowhere")
+                    raise errors.HandshakeError(
+                        f"{self.url}{path} redirects to {errors.printable(target, 200)}, which is "
+                        "not followed: if that is the policy server, give its address"
                     )
                 if len(data) <= MAX_ANSWER:
                     return response.status, response.reason, data
@@ -184,28 +176,30 @@ class JsonServer:
         finally:
             alarm.cancel()
         self.close()
-        raise ProtocolViolation(f"{self.url}{path} answered more than {MAX_ANSWER} bytes")
+        raise errors.ProtocolViolation(f"{self.url}{path} answered more than {MAX_ANSWER} bytes")
 
     def _failed(self, error: Exception, path: str, timeout: float) -> Exception:
         if isinstance(error, TimeoutError | socket.timeout):
             self.close()
-            return CallTimeout(
+            return errors.CallTimeout(
                 f"{self.url}{path} did not answer within {timeout:g} s; "
                 "look at the server's log, or allow more time"
             )
         return self._lost(error)
 
-    def _lost(self, error: Exception) -> ConnectionLost:
+    def _lost(self, error: Exception) -> errors.ConnectionLost:
         with contextlib.suppress(OSError):
             self.close()
         reason = str(error) or type(error).__name__
-        return ConnectionLost(f"the connection to {self.url} ended while waiting: {reason}")
+        return errors.ConnectionLost(f"the connection to {self.url} ended while waiting: {reason}")
 
     def _decoded(self, path: str, data: bytes) -> object:
         try:
             return json.loads(data)
         except (ValueError, RecursionError) as error:
-            raise ProtocolViolation(f"{self.url}{path} did not answer JSON: {error}") from error
+            raise errors.ProtocolViolation(
+                f"{self.url}{path} did not answer JSON: {error}"
+            ) from error
 
 
 class HttpSession(StatelessSession):
@@ -238,11 +232,11 @@ class HttpSession(StatelessSession):
         be. Raises what `JsonServer.request` raises."""
         try:
             answer = self._server.request("POST", self.path, body, timeout)
-        except ServerError as error:
+        except errors.ServerError as error:
             if error.code == BUSY:
                 raise
             if error.code == self._silent[0]:
-                error = ServerError(error.code, f"{error.message}; {self._silent[1]}", True)
+                error = errors.ServerError(error.code, f"{error.message}; {self._silent[1]}", True)
             raise error if self._answered else explain_error(error, self._params) from error
         self._answered = True
         return answer
@@ -279,7 +273,7 @@ def _reason(data: bytes) -> str:
         value = text
     if isinstance(value, Mapping):
         value = value.get("error", value.get("detail", value.get("message", value)))
-    return printable(str(value), MAX_REASON)
+    return errors.printable(str(value), MAX_REASON)
 
 
 def array_object(array: NDArray[Any]) -> dict[str, object]:

@@ -17,19 +17,8 @@ from typing import Any
 import numpy as np
 
 from robospa.action_space import ActionSpace
+from robospa.clients import model_policy
 from robospa.clients.chunks import STATE_TOKENS, Count, RobotOption
-from robospa.clients.model_policy import (
-    Chunk,
-    ModelMissing,
-    ModelPolicy,
-    NotByRow,
-    Query,
-    describe_checkpoint,
-    import_installed,
-    import_torch,
-    resize,
-    seeded_rows,
-)
 from robospa.clients.state_encoding import LAYOUTS, ORDERS, SPACES, StateEncoding
 from robospa.observation import CAMERAS, CameraSpec
 from robospa.protocol.options import option
@@ -47,7 +36,7 @@ class StateWidth:
 
     def __call__(self, transition: Any) -> Any:
         """The transition with a state of `width` numbers, zeros appended."""
-        torch = import_torch()
+        torch = model_policy.import_torch()
         changed = dict(transition)
         observation = dict(changed["observation"])
         state = observation[STATE]
@@ -197,7 +186,7 @@ class LeRobotServerOptions(RobotOption):
             raise ValueError(f"option space={self.space!r} is none of {', '.join(SPACES)}")
 
 
-class LeRobot(ModelPolicy):
+class LeRobot(model_policy.ModelPolicy):
     """A LeRobot policy with its processors."""
 
     def __init__(self, policy: Any, before: Any, after: Any, options: LeRobotServerOptions) -> None:
@@ -245,7 +234,7 @@ class LeRobot(ModelPolicy):
             embodiments=(options.embodiment,),
             action_dim=width if joint else ActionSpace("ee").width,
             text_budget=_text_budget(config),
-            checkpoint=describe_checkpoint(options.path),
+            checkpoint=model_policy.describe_checkpoint(options.path),
         )
 
     def _state_space(self, width: int, actions: int) -> str:
@@ -253,29 +242,29 @@ class LeRobot(ModelPolicy):
         joint = self.encoding.space == "joint"
         return "joint" if joint and width == actions else _space(width, "state")
 
-    def predict(self, queries: Sequence[Query]) -> list[Chunk]:
+    def predict(self, queries: Sequence[model_policy.Query]) -> list[model_policy.Chunk]:
         try:
             return self._predict(queries)
-        except NotByRow:
+        except model_policy.NotByRow:
             return [chunk for query in queries for chunk in self._predict([query])]
 
-    def _predict(self, queries: Sequence[Query]) -> list[Chunk]:
-        torch = import_torch()
+    def _predict(self, queries: Sequence[model_policy.Query]) -> list[model_policy.Chunk]:
+        torch = model_policy.import_torch()
         self.policy.reset()
         with torch.inference_mode():
             batch = self.before(self._batch(queries, None))
             batch.pop("action", None)  # empty, but a policy with queues would look for it
             if self.history:
                 batch = self._queue(queries, batch)
-            with seeded_rows([query.seed for query in queries]):
+            with model_policy.seeded_rows([query.seed for query in queries]):
                 answer = self.policy.predict_action_chunk(batch)
             chunks = self.after(answer).float().cpu().numpy()[:, : self.spec.horizon]
         return [self.encoding.actions(query, c) for query, c in zip(queries, chunks, strict=True)]
 
-    def _batch(self, queries: Sequence[Query], offset: int | None) -> dict[str, Any]:
+    def _batch(self, queries: Sequence[model_policy.Query], offset: int | None) -> dict[str, Any]:
         """The observations of now, or of `offset` actions ago, as LeRobot's data loader gives them:
         images float (B, C, H, W) from 0 to 1."""
-        torch = import_torch()
+        torch = model_policy.import_torch()
         batch: dict[str, Any] = {"task": [query.observation["instruction"] for query in queries]}
         seen = [
             query.observation if offset is None else query.observation["history"][offset]
@@ -295,13 +284,13 @@ class LeRobot(ModelPolicy):
 
     def _image(self, image: Any, view: ImageInput) -> Any:
         if self.options.resize == "declared" and view.key not in self.sources:
-            image = resize(image, view.width, view.height)
+            image = model_policy.resize(image, view.width, view.height)
         return np.ascontiguousarray(image if self.options.colors == "rgb" else image[..., ::-1])
 
-    def _queue(self, queries: Sequence[Query], now: dict[str, Any]) -> dict[str, Any]:
+    def _queue(self, queries: Sequence[model_policy.Query], now: dict[str, Any]) -> dict[str, Any]:
         """Fill the policy's queues with the frames of all queries, oldest first."""
-        torch = import_torch()
-        utils = import_installed("lerobot.policies.utils")
+        torch = model_policy.import_torch()
+        utils = model_policy.import_installed("lerobot.policies.utils")
         keys = list(self.policy.config.image_features)
         frames = [self.before(self._batch(queries, offset)) for offset in self.history]
         for frame in (*frames, now):
@@ -341,9 +330,9 @@ def _space(width: int, what: str) -> str:
 
 def create(options: LeRobotServerOptions) -> LeRobot:
     """Load a policy and its processors. Raises ModelMissing, ValueError."""
-    import_torch()
-    configs = import_installed("lerobot.configs.policies")
-    factory = import_installed("lerobot.policies.factory")
+    model_policy.import_torch()
+    configs = model_policy.import_installed("lerobot.configs.policies")
+    factory = model_policy.import_installed("lerobot.policies.factory")
     overrides: dict[str, Any] = {"device_processor": {"device": options.device}}
     if options.tokenizer is not None:
         overrides["tokenizer_processor"] = {"tokenizer_name": options.tokenizer}
@@ -357,7 +346,7 @@ def create(options: LeRobotServerOptions) -> LeRobot:
             config, options.path, preprocessor_overrides=overrides
         )
     except (OSError, KeyError, ImportError) as error:
-        raise ModelMissing(f"cannot load {options.path}: {error}") from error
+        raise model_policy.ModelMissing(f"cannot load {options.path}: {error}") from error
     if options.domain_id is not None:
         steps = [step for step in before.steps if hasattr(step, "domain_id")]
         if not steps:

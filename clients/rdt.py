@@ -19,22 +19,8 @@ from typing import Any
 import numpy as np
 
 from robospa.action_space import ActionSpace
+from robospa.clients import model_policy
 from robospa.clients.chunks import ChunkOptions
-from robospa.clients.model_policy import (
-    Chunk,
-    ModelMissing,
-    ModelPolicy,
-    Query,
-    describe_checkpoint,
-    existing,
-    import_code,
-    import_installed,
-    import_torch,
-    jpeg_round_trip,
-    pillow_image,
-    resize,
-    seeded_rows,
-)
 from robospa.observation import Observation
 from robospa.protocol.options import option
 from robospa.protocol.policy import TrialInfo
@@ -61,7 +47,9 @@ class Embeddings:
         self._files: dict[str, Path] = {}
         if folder is not None:
             if t5 is None and not folder.is_dir():
-                raise ModelMissing(f"there is no folder {folder}, and option t5 is none")
+                raise model_policy.ModelMissing(
+                    f"there is no folder {folder}, and option t5 is none"
+                )
             folder.mkdir(parents=True, exist_ok=True)
             for path in sorted(folder.glob("*.pt")):
                 found = self._read(path)
@@ -82,22 +70,26 @@ class Embeddings:
         return tensor[None] if tensor.ndim == 2 else tensor
 
     def _read(self, path: Path) -> Any:
-        torch = import_torch()
+        torch = model_policy.import_torch()
         try:
             found = torch.load(path, map_location="cpu", weights_only=True)
         except Exception as error:  # torch raises many kinds for broken files
-            raise ModelMissing(f"{path} is no file of T5 embeddings: {error}") from error
+            raise model_policy.ModelMissing(
+                f"{path} is no file of T5 embeddings: {error}"
+            ) from error
         if not isinstance(found, dict) or getattr(found.get("embeddings"), "ndim", 0) not in (2, 3):
-            raise ModelMissing(f"{path} is no file of T5 embeddings: it lacks 'embeddings'")
+            raise model_policy.ModelMissing(
+                f"{path} is no file of T5 embeddings: it lacks 'embeddings'"
+            )
         return found
 
     def _make(self, instruction: str) -> Any:
         if self._t5 is None:
-            raise ModelMissing(
+            raise model_policy.ModelMissing(
                 f"no file in {self._folder} has the embedding of {instruction!r}; make one with "
                 "RDT's scripts/encode_lang.py, or give option t5"
             )
-        torch = import_torch()
+        torch = model_policy.import_torch()
         tokenizer, encoder = self._load()
         tokens = tokenizer(
             instruction,
@@ -119,7 +111,7 @@ class Embeddings:
         """Tokenizer and encoder; the official embedder insists on a folder of a certain name, so
         the encoder is loaded without it."""
         if self._encoder is None:
-            transformers = import_installed("transformers")
+            transformers = model_policy.import_installed("transformers")
             encoder = transformers.T5EncoderModel.from_pretrained(
                 self._t5, torch_dtype=self._dtype, low_cpu_mem_usage=True
             )
@@ -169,24 +161,24 @@ class RdtServerOptions(ChunkOptions):
             raise ValueError("options embeddings and t5 are both none: instructions need one")
 
 
-class Rdt(ModelPolicy):
+class Rdt(model_policy.ModelPolicy):
     """The official class, one observation at a time: it stacks images of one sample only."""
 
     def __init__(self, model: Any, embeddings: Embeddings, options: RdtServerOptions) -> None:
         super().__init__()
         self.model, self.embeddings, self.options = model, embeddings, options
-        checkpoint = describe_checkpoint(options.checkpoint)
+        checkpoint = model_policy.describe_checkpoint(options.checkpoint)
         self.spec = options.spec_of("rdt", history=(-1,), seeded=True, checkpoint=checkpoint)
 
     def begin(self, trial: TrialInfo) -> None:
         """Encode the trial's instruction now, so that no step waits for it."""
         self.embeddings.find(trial.instruction)
 
-    def predict(self, queries: Sequence[Query]) -> list[Chunk]:
+    def predict(self, queries: Sequence[model_policy.Query]) -> list[model_policy.Chunk]:
         return [self._one(query.observation, query.seed) for query in queries]
 
-    def _one(self, observation: Observation, seed: int) -> Chunk:
-        torch = import_torch()
+    def _one(self, observation: Observation, seed: int) -> model_policy.Chunk:
+        torch = model_policy.import_torch()
         now, first = observation["images"], int(observation["step"]) < 1
         past = None if first else observation["history"][-1]["images"]
         images = [None if past is None else self._picture(past[name]) for name in VIEWS]
@@ -194,26 +186,28 @@ class Rdt(ModelPolicy):
         state = np.array(observation["state"], np.float32)
         if self.options.grippers == "cancelled":
             state[ActionSpace("joint").grippers] *= STATE_FACTORS
-        with torch.inference_mode(), seeded_rows([seed]):
+        with torch.inference_mode(), model_policy.seeded_rows([seed]):
             answer = self.model.step(
                 torch.from_numpy(state[None]),
                 images,
                 self.embeddings.find(observation["instruction"]),
             )
-        chunk: Chunk = answer.float().cpu().numpy()[0, : self.options.horizon].copy()
+        chunk: model_policy.Chunk = answer.float().cpu().numpy()[0, : self.options.horizon].copy()
         if self.options.grippers == "cancelled":
             chunk[:, ActionSpace("joint").grippers] /= np.array(ACTION_FACTORS, np.float32)
         return chunk
 
     def _picture(self, image: Any) -> Any:
-        large = resize(image, 640, 480)
-        return pillow_image().fromarray(jpeg_round_trip(large) if self.options.jpeg else large)
+        large = model_policy.resize(image, 640, 480)
+        return model_policy.pillow_image().fromarray(
+            model_policy.jpeg_round_trip(large) if self.options.jpeg else large
+        )
 
 
 def create(options: RdtServerOptions) -> Rdt:
     """Load the model. Raises ModelMissing."""
-    torch = import_torch()
-    source = import_code(
+    torch = model_policy.import_torch()
+    source = model_policy.import_code(
         "scripts.agilex_model", options.code, "a checkout of RoboticsDiffusionTransformer"
     )
     dtype = getattr(torch, options.dtype)
@@ -227,7 +221,7 @@ def create(options: RdtServerOptions) -> Rdt:
         args=args,
         dtype=dtype,
         device=options.device,
-        pretrained=existing(options.checkpoint, "checkpoint"),
+        pretrained=model_policy.existing(options.checkpoint, "checkpoint"),
         pretrained_vision_encoder_name_or_path=options.vision,
         control_frequency=options.ctrl_freq,
     )
@@ -243,9 +237,9 @@ def create(options: RdtServerOptions) -> Rdt:
 
 def read_config(path: str | None, source: Any) -> dict[str, Any]:
     """The model's YAML as a map; by default that beside the code. Raises ModelMissing."""
-    yaml = import_installed("yaml")
+    yaml = model_policy.import_installed("yaml")
     chosen = path or str(Path(source.__file__).resolve().parents[1] / "configs" / "base.yaml")
-    value = yaml.safe_load(Path(existing(chosen, "config")).read_text())
+    value = yaml.safe_load(Path(model_policy.existing(chosen, "config")).read_text())
     if not isinstance(value, dict) or "dataset" not in value:
-        raise ModelMissing(f"{chosen} is no configuration of RDT: it lacks 'dataset'")
+        raise model_policy.ModelMissing(f"{chosen} is no configuration of RDT: it lacks 'dataset'")
     return value

@@ -30,14 +30,7 @@ from robospa.clients.dialect import (
 )
 from robospa.clients.http import array_of, has_unread_bytes
 from robospa.observation import Observation
-from robospa.protocol.errors import (
-    CallTimeout,
-    ConnectionLost,
-    EncodeError,
-    ProtocolViolation,
-    ServerError,
-    printable,
-)
+from robospa.protocol import errors
 from robospa.protocol.options import option
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.transport import connect_until
@@ -88,21 +81,21 @@ class FramedJson:
         try:
             text = json.dumps({"cmd": method, "obs": value}, default=to_json).encode()
         except (TypeError, ValueError) as error:
-            raise EncodeError(f"cannot encode the observation: {error}") from error
+            raise errors.EncodeError(f"cannot encode the observation: {error}") from error
         if self._socket is None:
-            raise ConnectionLost(f"the connection to {self.url} was closed after an error")
+            raise errors.ConnectionLost(f"the connection to {self.url} was closed after an error")
         try:
             answer = self._exchange(self._socket, text, deadline)
         except TimeoutError as error:
             self.close()
-            raise CallTimeout(
+            raise errors.CallTimeout(
                 f"{self.url} did not answer {method} within {timeout:g} s; "
                 "look at the server's log, or allow more time"
             ) from error
         except OSError as error:
             self.close()
             reason = str(error) or type(error).__name__
-            raise ConnectionLost(
+            raise errors.ConnectionLost(
                 f"the connection to {self.url} ended while waiting: {reason}"
             ) from error
         return self._result(method, answer)
@@ -110,14 +103,14 @@ class FramedJson:
     def _exchange(self, sock: socket.socket, text: bytes, deadline: float) -> bytes:
         if has_unread_bytes(sock):
             self.close()
-            raise ProtocolViolation(f"{self.url} sent data that was not requested")
+            raise errors.ProtocolViolation(f"{self.url} sent data that was not requested")
         sock.settimeout(max(deadline - time.monotonic(), 1e-3))
         # One piece: the server reads the length with a single call and would tear a split one.
         sock.sendall(len(text).to_bytes(4, "big") + text)
         size = int.from_bytes(_read(sock, 4, deadline), "big")
         if size > self._limit:
             self.close()
-            raise ProtocolViolation(
+            raise errors.ProtocolViolation(
                 f"{self.url} announced an answer of {size} bytes, over the limit of {self._limit}: "
                 "is it RoboTwin's model server?"
             )
@@ -128,16 +121,18 @@ class FramedJson:
             value = json.loads(answer, object_hook=from_json)
         except (ValueError, RecursionError) as error:
             self.close()
-            raise ProtocolViolation(f"{self.url} did not answer JSON: {error}") from error
+            raise errors.ProtocolViolation(f"{self.url} did not answer JSON: {error}") from error
         if isinstance(value, Mapping) and "error" in value:
             self.close()  # so does the server
-            text = printable(str(value["error"]), MAX_REASON)
-            failure = ServerError("an error", f"{text} (in {method})", True, self.url)
+            text = errors.printable(str(value["error"]), MAX_REASON)
+            failure = errors.ServerError("an error", f"{text} (in {method})", True, self.url)
             failure.add_note(str(value.get("traceback", "")))
             raise failure
         if not isinstance(value, Mapping) or "res" not in value:
             self.close()
-            raise ProtocolViolation(f"{self.url} answered neither 'res' nor 'error' to {method}")
+            raise errors.ProtocolViolation(
+                f"{self.url} answered neither 'res' nor 'error' to {method}"
+            )
         refuse_unread(value, ("res",))
         return value["res"]
 
@@ -287,7 +282,7 @@ class RoboTwinSession(StatelessSession):
     ) -> object:
         try:
             result = self._connection.call(method, value, timeout, until)
-        except (CallTimeout, ConnectionLost, ProtocolViolation) as error:
+        except (errors.CallTimeout, errors.ConnectionLost, errors.ProtocolViolation) as error:
             # There is no handshake, so this may be another server altogether.
             if self._answered:
                 raise
@@ -304,7 +299,7 @@ def recognise(probe: Probe) -> bool:
     connection = FramedJson(probe.params)
     try:
         connection.call("", None, probe.params.timeouts.infer)
-    except ServerError:
+    except errors.ServerError:
         return True
     finally:
         connection.close()

@@ -31,15 +31,7 @@ from robospa.harness.running.manifest import changed_settings
 from robospa.harness.running.policy_probe import probe_policies
 from robospa.harness.seeds.attempt import expert_pool
 from robospa.harness.trial import salt_hash
-from robospa.leaderboard.agreement import (
-    CELL_LIE,
-    LEAST_POWER,
-    LIE,
-    Counts,
-    cells,
-    power,
-    trials_needed,
-)
+from robospa.leaderboard import agreement
 from robospa.leaderboard.bundle import MEGA, BundleError, canonical, parse_map, sha256
 from robospa.leaderboard.evidence import RANKED, TESTED, Reproduction
 from robospa.leaderboard.rules import Reference
@@ -147,7 +139,7 @@ def read_block(path: Path, commitment: str) -> Block:
 
 MOST_ALPHA = 0.1
 """A test at a higher level is none."""
-DROPS = (0.02, LIE, 0.1)
+DROPS = (0.02, agreement.LIE, 0.1)
 """Losses of success for which the power is stated."""
 
 
@@ -157,12 +149,14 @@ COUNTED: dict[str, Callable[[TrialRecord], bool]] = dict(
 """What counts as a success in the metrics that are tested."""
 
 
-def claims_of(valid: Valid, metric: str = RANKED) -> dict[str, Counts]:
+def claims_of(valid: Valid, metric: str = RANKED) -> dict[str, agreement.Counts]:
     """What the bundle claims of each of its variants, without fresh trials."""
     found: dict[str, list[bool]] = {}
     for key, record in valid.run.records.items():
         found.setdefault(f"{key.task}/{key.level}", []).append(COUNTED[metric](record))
-    return {variant: Counts(sum(made), len(made), 0, 0) for variant, made in found.items()}
+    return {
+        variant: agreement.Counts(sum(made), len(made), 0, 0) for variant, made in found.items()
+    }
 
 
 def plan(valid: Valid, trials: int | None, alpha: float = 0.01) -> int:
@@ -175,28 +169,28 @@ def plan(valid: Valid, trials: int | None, alpha: float = 0.01) -> int:
         raise BundleError(f"a test at the level {alpha:g} is none; choose at most {MOST_ALPHA:g}")
     if valid.manifest.practice and trials is not None and trials > 0:
         return trials
-    needed = trials_needed(list(claims.values()), alpha)
+    needed = agreement.trials_needed(list(claims.values()), alpha)
     if needed is None:
         raise BundleError(
             f"no block earns this bundle a badge: with {len(valid.keys)} trials its own rates are "
-            f"too uncertain to notice a lie of {100 * LIE:g} points"
+            f"too uncertain to notice a lie of {100 * agreement.LIE:g} points"
         )
     if trials is not None and trials < needed:
         raise BundleError(
             f"{trials} hidden trials a variant are too few: {needed} notice a lie of "
-            f"{100 * LIE:g} points with {100 * LEAST_POWER:g} %"
+            f"{100 * agreement.LIE:g} points with {100 * agreement.LEAST_POWER:g} %"
         )
     if trials is not None:
         return trials
     found, level = _cells(valid, alpha)
     categories = [[claims[v] for v in own] for place, own in found.items() if place in RANKED_ROWS]
-    more = [trials_needed(own, level, CELL_LIE) or 0 for own in categories]
+    more = [agreement.trials_needed(own, level, agreement.CELL_LIE) or 0 for own in categories]
     return max(needed, *more, 0)
 
 
 def _cells(valid: Valid, alpha: float) -> tuple[dict[str, tuple[str, ...]], float]:
     """The cells of the bundle, and the level that is left for each when all are tested."""
-    found = cells(claims_of(valid), valid.run.manifest.categories)
+    found = agreement.cells(claims_of(valid), valid.run.manifest.categories)
     return found, alpha / (len(COUNTED) * len(set(found.values())))
 
 
@@ -247,7 +241,7 @@ def compare(
             f"{len(keys)} trials are missing; go on with --resume"
         )
     records = with_repeated_failed(fresh.records)
-    made: dict[str, dict[str, Counts]] = {}
+    made: dict[str, dict[str, agreement.Counts]] = {}
     for metric, good in COUNTED.items():
         claims = claims_of(valid, metric)
         found: dict[str, list[bool]] = {variant: [] for variant in claims}
@@ -259,7 +253,8 @@ def compare(
     ranked = made[RANKED]
     places, level = _cells(valid, alpha)
     chances = {
-        own: power([ranked[v] for v in own], CELL_LIE, level) for own in set(places.values())
+        own: agreement.power([ranked[v] for v in own], agreement.CELL_LIE, level)
+        for own in set(places.values())
     }
     return Reproduction(
         bundle=valid.manifest.bundle,
@@ -269,6 +264,6 @@ def compare(
         alpha=alpha,
         categories=valid.run.manifest.categories,
         counts={m: {v: astuple(c) for v, c in counts.items()} for m, counts in made.items()},
-        power={f"{drop:g}": power(list(ranked.values()), drop, alpha) for drop in DROPS},
+        power={f"{drop:g}": agreement.power(list(ranked.values()), drop, alpha) for drop in DROPS},
         cells={place: chances[own] for place, own in places.items()},
     )

@@ -13,26 +13,9 @@ from robospa.results.paper import rounding
 from robospa.results.paper.published import LEVELS, Published, find_model, load, title
 from robospa.results.records.manifest import Departure, departures
 from robospa.results.records.runs import Run
-from robospa.results.scoring.models import (
-    TABLE,
-    IncomparableError,
-    ModelResults,
-    Setting,
-    check_alike,
-    check_same,
-    in_official_world,
-    results_of_run,
-    suite_of,
-)
+from robospa.results.scoring import models
 from robospa.results.scoring.scores import IDLE, AverageScore, Scores, VariantScore, combine
-from robospa.results.statistics.intervals import (
-    METHODS,
-    Estimate,
-    bounded_mean,
-    chance_corrected,
-    interval_of,
-    wilson,
-)
+from robospa.results.statistics import intervals
 from robospa.results.statistics.samples import Sample, onta_of_percent, rate
 from robospa.results.tables import MISSING, TableCell
 from robospa.trial import BASIC, CATEGORIES, METRIC_CATEGORIES, RATES, SPATIAL
@@ -45,11 +28,11 @@ def published_cell(published: Published, model: str, task: str, level: int) -> V
     sr = published.value(model, "sr", task, level)
     assert sr is not None, f"no SR of {task}"
     successes = round(sr * trials / 100)
-    found = wilson(successes, trials)
-    values: dict[str, Estimate | None] = {"sr": found}
+    found = intervals.wilson(successes, trials)
+    values: dict[str, intervals.Estimate | None] = {"sr": found}
     samples = {"sr": rate(successes, trials)}
     if about.category in SPATIAL:
-        values["onta"] = chance_corrected(found, count)
+        values["onta"] = intervals.chance_corrected(found, count)
         samples["onta"] = rate(successes, trials, count)
         return VariantScore(
             task, level, about.category, trials, trials, successes, values, count, samples
@@ -57,19 +40,19 @@ def published_cell(published: Published, model: str, task: str, level: int) -> V
     printed = published.value(model, "ps", task, level)
     assert printed is not None, f"no PS of {task}"
     progress = rounding.exact_progress(printed, count, trials)
-    values["ps"] = bounded_mean(progress / 100, trials)
+    values["ps"] = intervals.bounded_mean(progress / 100, trials)
     return VariantScore(
         task, level, about.category, trials, trials, successes, values, samples=samples
     )
 
 
-def results_beside_runs(model: str, ci: str = METHODS[0]) -> ModelResults:
+def results_beside_runs(model: str, ci: str = intervals.METHODS[0]) -> models.ModelResults:
     """A published model whose name says that its numbers are the paper's."""
     found = published_results(model, ci)
     return replace(found, name=f"{found.name} (paper)")
 
 
-def published_results(model: str, ci: str = METHODS[0]) -> ModelResults:
+def published_results(model: str, ci: str = intervals.METHODS[0]) -> models.ModelResults:
     """A published model, computed from its per-task tables."""
     data, model = load(), find_model(model)
     cells = {
@@ -77,8 +60,8 @@ def published_results(model: str, ci: str = METHODS[0]) -> ModelResults:
         for task in data.tasks
         for level in LEVELS
     }
-    setting = Setting((data.embodiment,), (data.mode,), (data.split,), (data.suite,))
-    return ModelResults(title(model), combine(cells, ci), setting, published=model)
+    setting = models.Setting((data.embodiment,), (data.mode,), (data.split,), (data.suite,))
+    return models.ModelResults(title(model), combine(cells, ci), setting, published=model)
 
 
 Values = Mapping[str, Mapping[tuple[str, int], float | None]]
@@ -93,7 +76,7 @@ class Column:
     competes with nobody.
     """
 
-    results: ModelResults
+    results: models.ModelResults
     idle: bool = False
     """Whether it is what holds on a run's scenes before the first action, as progress."""
 
@@ -141,7 +124,7 @@ class Column:
     def value(self, metric: str, row: str, level: int) -> float | None:
         return self.values[metric].get((row, level))
 
-    def estimate(self, metric: str, row: str, level: int) -> Estimate | None:
+    def estimate(self, metric: str, row: str, level: int) -> intervals.Estimate | None:
         """The value with its interval, as fractions; None where the value is missing."""
         part = self.scores.part(row, level)
         if part is None or self.value(metric, row, level) is None:
@@ -150,7 +133,7 @@ class Column:
             return None
         return part.values.get(metric)
 
-    def sample(self, metric: str, row: str, level: int) -> Sample | Estimate | None:
+    def sample(self, metric: str, row: str, level: int) -> Sample | intervals.Estimate | None:
         """The input of a test: counts of a variant's success rate, else value and interval, which
         is not the bootstrap's: that can be a point."""
         part = self.scores.part(row, level)
@@ -163,7 +146,7 @@ class Column:
         if below is None or isinstance(below, Sample):
             return below if below is not None else found
         samples, weights = zip(*below, strict=True) if below else ((), ())
-        return interval_of(samples, weights) if samples else found
+        return intervals.interval_of(samples, weights) if samples else found
 
     def samples(self, row: str, level: int) -> tuple[list[Sample], list[float]]:
         """Success counts of all variants below a row, and each one's share of its mean.
@@ -277,24 +260,24 @@ def idle_column(runs: Sequence[Column]) -> Column | None:
     return Column(results, idle=True) if cells else None
 
 
-def published_column(model: str, name: str = "", ci: str = METHODS[0]) -> Column:
+def published_column(model: str, name: str = "", ci: str = intervals.METHODS[0]) -> Column:
     """A published model as a column, called `name` or as the paper writes it."""
     results = published_results(model, ci)
     return Column(replace(results, name=name) if name else results)
 
 
-def run_column(run: Run, name: str = "", ci: str = METHODS[0]) -> Column:
+def run_column(run: Run, name: str = "", ci: str = intervals.METHODS[0]) -> Column:
     """`run` as a column, called `name` or as its policy; see `column_of`."""
-    return column_of(results_of_run(run, name or run.manifest.policy.name, ci))
+    return column_of(models.results_of_run(run, name or run.manifest.policy.name, ci))
 
 
-def column_of(results: ModelResults) -> Column:
+def column_of(results: models.ModelResults) -> Column:
     """A run's results as a column; IncomparableError if a column cannot hold them all."""
     data, column = load(), Column(results)
     where, variants = f"the run {column.title}", results.scores.cells
     if not variants:
-        raise IncomparableError(f"{where} lists no trials; there is nothing to show")
-    check_same([(where, results.setting)], TABLE)
+        raise models.IncomparableError(f"{where} lists no trials; there is nothing to show")
+    models.check_same([(where, results.setting)], models.TABLE)
     basic = {task for task, category in results.manifest.categories.items() if category in BASIC}
     unknown = sorted(
         f"{task} L{level}"
@@ -302,7 +285,7 @@ def column_of(results: ModelResults) -> Column:
         if not (level in LEVELS and (task in data.tasks or task in basic))
     )
     if unknown:
-        raise IncomparableError(
+        raise models.IncomparableError(
             f"{where} has variants that the benchmark's tables do not know "
             f"({', '.join(unknown[:3])}{', ...' if len(unknown) > 3 else ''}); see `robospa tasks`"
         )
@@ -312,23 +295,25 @@ def column_of(results: ModelResults) -> Column:
 def check_worlds(columns: Sequence[Column]) -> None:
     """IncomparableError if runs of official worlds and of this benchmark's own suites are mixed."""
     runs = [column.results for column in columns if not column.published]
-    official = [run for run in runs if in_official_world(run)]
+    official = [run for run in runs if models.in_official_world(run)]
     if 0 < len(official) < len(runs):
-        ours = next(run for run in runs if not in_official_world(run))
-        raise IncomparableError(
-            f"{official[0].name} is of the suite {suite_of(official[0])} and stands beside the "
-            f"paper, never beside {ours.name} of {suite_of(ours) or 'no stated suite'}: make a "
-            "table of each"
+        ours = next(run for run in runs if not models.in_official_world(run))
+        raise models.IncomparableError(
+            f"{official[0].name} is of the suite {models.suite_of(official[0])} and stands beside "
+            f"the paper, never beside {ours.name} of {models.suite_of(ours) or 'no stated suite'}: "
+            "make a table of each"
         )
 
 
 def check_columns(columns: Sequence[Column]) -> None:
     """IncomparableError unless all runs were measured on the same suite, embodiment, scenes and
     instructions, and published models beside them on the same embodiment and scenes."""
-    check_alike([column.results for column in columns], TABLE)
+    models.check_alike([column.results for column in columns], models.TABLE)
     titles = [c.title for c in columns]
     twice = sorted({t for t in titles if titles.count(t) > 1})
     if twice:
-        raise IncomparableError(f"two columns are called {twice[0]}; give one of them another name")
+        raise models.IncomparableError(
+            f"two columns are called {twice[0]}; give one of them another name"
+        )
     if not columns:
-        raise IncomparableError("a table needs at least one published model or run")
+        raise models.IncomparableError("a table needs at least one published model or run")
