@@ -1,15 +1,8 @@
 """GO-1 (AgiBot World): its own `deploy.py` (POST /act, JSON with arrays inside), or its class here.
 
-    ours                   read
-    images.head            top     (240, 320, 3) uint8 RGB
-    images.right_wrist     right   (swapped with left if `wrists=swapped`)
-    images.left_wrist      left
-    state (14,)            state   (1, 14) float64
-    instruction            instruction
-    option ctrl_freq       ctrl_freqs (1,) int64, float64 for a fraction
-
-The answer is a bare list (T, 14) of absolute joint targets. There is no reset, no spec and no
-reason in its errors: every failure inside the server is a bare HTTP 500.
+docs/policies/go1.md has what is sent (`Go1Conventions.inputs`). The answer is a bare list (T, 14)
+of absolute joint targets. There is no reset, no spec and no reason in its errors: every failure
+inside the server is a bare HTTP 500.
 
 `robospa serve go1` runs the official inference class in this process instead: the policy seed of a
 trial decides the noise, and nothing is coded as JSON. It takes one observation at a time.

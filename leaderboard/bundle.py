@@ -1,16 +1,7 @@
 """What a submission bundle is: a zip file of known names, sizes and hashes, and nothing else.
 
-    manifest.json            versions, size and hash of every other file, the bundle's own hash
-    model.json               the model card
-    run.json                 resolved settings, list of trials, versions, machine
-    records.jsonl            one hash-chained row a trial, by task, level and seed
-    actions/TASK-L1.bin      the actions of a variant's trials
-    videos/TRIAL.mp4         the announced sample, one trial a base task
-    report/scores.json       all scores, as `robospa report` has them
-    report/outcomes.json     success and progress of every trial, a character each
-
-Names are matched against this list, sizes are bounded before a byte is read, and nothing in a
-bundle is ever extracted, imported or run.
+Names are matched against the list in docs/leaderboard.md, sizes are bounded before a byte is read,
+and nothing in a bundle is ever extracted, imported or run.
 
 The zip is looked at whole before a byte is unpacked, so that no two readers see two archives. JSON
 of strangers is finite numbers, no repeated fields, and text that is only text, without markup.

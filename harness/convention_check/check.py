@@ -317,9 +317,6 @@ def absolute(chunk: Array, now: Array, space: ActionSpace) -> Array:
     return poses
 
 
-# ---------------------------------------------------------------- judging
-
-
 def judge(
     cases: Sequence[AnswerSample],
     shown: dict[str, list[AnswerSample]],

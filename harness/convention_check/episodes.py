@@ -1,18 +1,9 @@
 """Recorded demonstrations: read the official HDF5 files and ours, write ours.
 
-One layout for both, that of RoboTwin and RoboSPA (`data/episode<i>.hdf5`), so that what `robospa
-record` writes can be trained on with the official converters:
-
-    observation/head_camera/rgb     (T,) JPEG of each frame; left_camera, right_camera: the wrists
-    joint_action/vector             (T, 14) commands: 6 left joints [rad], gripper, the right
-    endpose/left_endpose            (T, 7) x y z qw qx qy qz, world frame; right_endpose
-    endpose/left_gripper            (T,) commanded, 0 closed to 1 open; right_gripper
-
-The action of frame t is the command of frame t + 1. Red and blue are exchanged inside the JPEGs
-(they were coded from RGB as if it were BGR) and put right here. Our files have two things more:
-`joint_action/measured` (T, 14), and as attributes of the file `instruction`, `task`, `level`,
-`seed`, `embodiment`, `mode`, `split` and `stride`, the physics steps from one frame to the next.
-Needs h5py and Pillow, which the extra `demos` brings.
+One layout for both, that of RoboTwin and RoboSPA (docs/replay-check.md has the table), so that
+what `robospa collect` writes can be trained on with the official converters. The action of frame t
+is the command of frame t + 1. Red and blue are exchanged inside the JPEGs (they were coded from RGB
+as if it were BGR) and put right here. Needs h5py and Pillow, which the extra `demos` brings.
 """
 
 from __future__ import annotations

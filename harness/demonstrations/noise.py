@@ -251,8 +251,6 @@ def _places(line: Array) -> NDArray[np.intp]:
     return np.linspace(0, len(line) - 1, PLACES + 2).round().astype(np.intp)[1:-1]
 
 
-# ---------------------------------------------------------------- clearance
-
 MARGIN = 0.01
 """How much larger than they are [m] objects count, besides what the expert's own clearance adds."""
 ABOVE_TABLE = 0.015

@@ -115,8 +115,6 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._record: TrialRecord | None = None
         self._told = 0
 
-    # -- Gymnasium's interface ----------------------------------------------------------------
-
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[Observation, Info]:
@@ -182,8 +180,6 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._window.close()
             self._window = None
         self._trial = None
-
-    # -- what else is known -------------------------------------------------------------------
 
     @property
     def key(self) -> TrialKey:
@@ -329,8 +325,6 @@ def register_tasks() -> None:
         if env_id(name) not in registration.registry:
             registration.register(env_id(name), entry_point=ENTRY, kwargs={"task": name})
 
-
-# ---------------------------------------------------------------- spaces
 
 SENTENCE = 1000
 """Most characters of an instruction."""

@@ -135,18 +135,11 @@ class RoboSPAConfig(EnvConfig):
 
     @property
     def gym_kwargs(self) -> dict[str, Any]:
+        same = ("embodiment", "mode", "split", "state", "action", "control", "step_scale")
         return {
-            "embodiment": self.embodiment,
-            "mode": self.mode,
-            "split": self.split,
+            **{name: getattr(self, name) for name in (*same, "world", "parts")},
             "cameras": [name.strip() for name in self.cameras.split(",")],
             "size": (self.width, self.height),
-            "state": self.state,
-            "action": self.action,
-            "control": self.control,
-            "step_scale": self.step_scale,
-            "world": self.world,
-            "parts": self.parts,
             "render_mode": "rgb_array",
         }
 

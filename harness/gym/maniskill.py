@@ -6,14 +6,8 @@ and a goal that watches at 50 Hz. So nothing here is built by ManiSkill: what it
 scene comes from the trial, and what it computes from that (observation modes, spaces, rewards,
 recording) is its own. An episode is a trial, and `reset(seed=s)` the trial of the seed s.
 
-An observation is a tree of arrays whose first axis is ManiSkill's batch, or time:
-
-    agent        qpos, controller/target_qpos      joints [rad] and grippers (0 closed, 1 open),
-                                                    as measured and as last commanded (D,)
-    extra        left_tcp_pose, right_tcp_pose      x y z [m], qw qx qy qz, world frame (7,)
-                 objects                            the objects as numbers (E,), state modes alone
-    sensor_param CAMERA/intrinsic_cv                (3, 3) [px]
-    sensor_data  CAMERA/rgb                         uint8 (height, width, 3)
+An observation is a tree of arrays whose first axis is ManiSkill's batch, or time; what is in it
+says docs/gymnasium.md.
 """
 
 from __future__ import annotations
@@ -141,8 +135,6 @@ class RoboSPAEnv(BaseEnv):
         # BaseEnv forgets both before it makes them anew, so they have to be there.
         _ = self.single_observation_space, self.observation_space
 
-    # -- an episode ---------------------------------------------------------------------------
-
     def reset(
         self,
         seed: int | Sequence[int] | None = None,
@@ -182,8 +174,6 @@ class RoboSPAEnv(BaseEnv):
     def close(self) -> None:
         self.task_env.close()
 
-    # -- what BaseEnv's observations are made of ------------------------------------------------
-
     def _show(self, observation: Mapping[str, Any], told: Mapping[str, Any] | None = None) -> None:
         """Keep what a trial, or before the first an empty one, shows and tells now."""
         self._told = told or {"success": False, "done": 0, "best": 0, "total": 0}
@@ -216,8 +206,6 @@ class RoboSPAEnv(BaseEnv):
     def get_sensor_images(self) -> Tree:
         return self._get_obs_sensor_data()
 
-    # -- pictures -------------------------------------------------------------------------------
-
     def render_rgb_array(self, camera_name: str | None = None) -> torch.Tensor | None:
         """The picture of `render_camera`, uint8 (1, height, width, 3)."""
         picture = self.task_env.render()
@@ -228,8 +216,6 @@ class RoboSPAEnv(BaseEnv):
 
     def render_all(self) -> torch.Tensor:
         return tile_images([self.render_rgb_array(), *self._pictures.values()])
-
-    # -- what is told of a trial ----------------------------------------------------------------
 
     @property
     def record(self) -> TrialRecord | None:

@@ -148,8 +148,6 @@ def _joined(shapes: Sequence[Piece]) -> Piece:
     return np.concatenate([vertices for vertices, _ in shapes]), np.concatenate(faces)
 
 
-# -- shapes of a model -------------------------------------------------------------------------
-
 SQUARE = 1e-3
 """Cosine below which two faces of a box meet at right angles."""
 
@@ -176,8 +174,6 @@ def _shape(corners: Floats, triangles: Ints) -> Shape:
     pose = Pose(vec3(turn @ middle), from_matrix(turn))
     return Shape(Box(vec3(half)), pose, visual=False)
 
-
-# -- hollows -----------------------------------------------------------------------------------
 
 SHALLOW = 0.25
 """A hollow no deeper than this share of the height is filled; those of our bowls have 0.6."""

@@ -303,8 +303,6 @@ def connected(faces: Ints, count: int) -> Ints:
     return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
 
 
-# -- what a GLB file promises ------------------------------------------------------------------
-
 LARGEST_FILE = 512 << 20
 """Bytes that a mesh file may have; the median official one has 7 MB."""
 LARGEST_HEADER = 64 << 20

@@ -160,9 +160,6 @@ def _hinge(
     )
 
 
-# -- the files of a model as bodies ------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Body:
     """`skin` is a file as `robospa.tasks.shapes.Skin` wants it, `box` (2, 3) the corners around
@@ -242,8 +239,6 @@ def _body(
         skin, archives.load_arrays(skin, "box")["box"], colliding_pieces(archive, solid, whole)
     )
 
-
-# -- things that lie about ---------------------------------------------------------------------
 
 SIZES = (0.005, 0.6)
 """Lengths [m] that a thing on a table may have along its longest side."""

@@ -29,8 +29,6 @@ from robospa.tasks.objects.build import MAX_WIDTH, points_of
 from robospa.tasks.official import OfficialModel, official_size
 from robospa.tasks.shapes import Grasp, ObjectModel
 
-# -- the file of a model's points --------------------------------------------------------------
-
 LARGEST_DATA = 4 << 20
 """Bytes that such a file may have; the largest official one has some tens of kilobytes."""
 Points = Annotated[list[Any], Meta(max_length=256)]
@@ -142,8 +140,6 @@ def _matrix(row: object) -> object:
     values = row.values() if isinstance(row, dict) else ()
     return next((value for value in values if isinstance(value, list)), row)
 
-
-# -- where it stands ---------------------------------------------------------------------------
 
 Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """Turns the archive's y axis up; its z axis, the front, goes to -y."""
@@ -269,8 +265,6 @@ def frames(
         found[name] = replace(builtin.frames[name], position=at)
     return found
 
-
-# -- where it can be held ----------------------------------------------------------------------
 
 UPWARDS = -0.2
 """A gripper comes from above: its approach's z is no larger."""

@@ -159,8 +159,6 @@ def _moved(mesh: RawMesh, transform: Floats) -> RawMesh:
     return RawMesh(points, mesh.faces[:, ::-1] if inverted else mesh.faces, mesh.uv, mesh.picture)
 
 
-# -- robots ------------------------------------------------------------------------------------
-
 MOST_FILES = 200
 """URDF files in a robot's folder that are looked at."""
 

@@ -88,14 +88,6 @@ def _lattice(draw: Draw, across: float, down: float) -> Field:
     return left + (lines[:, c + 1] - left) * v
 
 
-def at(field: Field, x: Field, y: Field) -> Field:
-    """Values of `field` at other places, 0..1, without interpolation; it goes on by repetition."""
-    i = (np.floor(y * SIZE)).astype(np.int32) % SIZE
-    j = (np.floor(x * SIZE)).astype(np.int32) % SIZE
-    found: Field = field[i, j]
-    return found
-
-
 def turned(slope: float, x: Field = X, y: Field = Y) -> tuple[Field, Field]:
     """Coordinates turned about the middle by twice the angle whose tangent is `slope`."""
     cos, sin = (1 - slope**2) / (1 + slope**2), 2 * slope / (1 + slope**2)

@@ -171,10 +171,7 @@ class DrawnMesh:
 
 @dataclass(frozen=True)
 class DrawnBody:
-    """A body by its name; one that never moves has its `pose` [m, world].
-
-    `box` are centre and size [m] of the box around it, in its frame.
-    """
+    """A body by its name; one that never moves has its `pose` [m, world]."""
 
     name: str
     meshes: tuple[DrawnMesh, ...]

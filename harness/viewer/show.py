@@ -13,7 +13,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, redirect_stdout
+from contextlib import closing, contextmanager, redirect_stdout
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
@@ -149,11 +149,8 @@ def of_run(folder: Path, name: str) -> tuple[Playback, list[DrawnBody]]:
     run = read_run(folder)
     record, config = trial_named(run, name), replay_config(run)
     parts = partial(load_function(config.parts), **config.parts_arguments)
-    world = SapienWorld(**{**config.world_arguments, "render": False})
-    try:
+    with closing(SapienWorld(**{**config.world_arguments, "render": False})) as world:
         played = recorded_playback(world, record, folder, parts=parts, step_scale=config.step_scale)
-    finally:
-        world.close()
     return played, drawn_bodies(parts(record.key).scene, embodiment(record.key.embodiment))
 
 
@@ -166,11 +163,8 @@ def of_expert(key: TrialKey) -> tuple[Playback, list[DrawnBody]]:
     from robospa.harness.trial import task_parts
 
     need("viser")
-    world = SapienWorld(render=False)
-    try:
+    with closing(SapienWorld(render=False)) as world:
         played = policy_playback(world, policy_factory(ORACLE)(), key)
-    finally:
-        world.close()
     return played, drawn_bodies(task_parts(key).scene, embodiment(key.embodiment))
 
 
@@ -336,37 +330,35 @@ def serving(
 
     Raises MissingPackage without viser, of the extra `view`, and OSError for a port that is taken.
     """
-    made = need("viser")
-    _check_port(port)
-    with _silent():
-        server = made.ViserServer(host=HOST, port=port, label="robospa", verbose=False)
-    try:
+    need("viser")
+    with socket.socket() as probe:  # viser takes the next free port in place of one that is taken
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        probe.bind((HOST, port))
+    with _server(playback, bodies, port) as (server, scene):
         server.gui.configure_theme(
             control_layout="fixed",
             control_width="large",
             show_logo=False,
             show_share_button=False,
         )
-        server.initial_camera.position = EYE
-        server.initial_camera.look_at = AT
-        scene = Scene3D(server.scene, playback, bodies)
         panel = Panel(server, scene, playback)
         yield f"http://{HOST}:{server.get_port()}", panel.advance
+
+
+@contextmanager
+def _server(
+    playback: Playback, bodies: Sequence[DrawnBody], port: int
+) -> Iterator[tuple[viser.ViserServer, Scene3D]]:
+    """viser with the scene of `playback`; what it prints as it starts and stops is not shown."""
+    made = need("viser")
+    with redirect_stdout(io.StringIO()):
+        server = made.ViserServer(host=HOST, port=port, label="robospa", verbose=False)
+    try:
+        server.initial_camera.position, server.initial_camera.look_at = EYE, AT
+        yield server, Scene3D(server.scene, playback, bodies)
     finally:
-        with _silent():
+        with redirect_stdout(io.StringIO()):
             server.stop()
-
-
-def _silent() -> redirect_stdout[io.StringIO]:
-    """For when viser starts and stops, which it prints."""
-    return redirect_stdout(io.StringIO())
-
-
-def _check_port(port: int) -> None:
-    """viser takes the next free port in place of one that is taken."""
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        probe.bind((HOST, port))
 
 
 def play(advance: Callable[[float], None], until: float) -> None:
@@ -379,23 +371,11 @@ def play(advance: Callable[[float], None], until: float) -> None:
 
 
 def as_html(playback: Playback, bodies: Sequence[DrawnBody]) -> str:
-    """`playback` as one HTML page that needs no server: the scene, which plays and can be turned.
-
-    Raises MissingPackage without viser.
-    """
-    made = need("viser")
-    with _silent():
-        server = made.ViserServer(host=HOST, port=0, verbose=False)
-    try:
-        server.initial_camera.position = EYE
-        server.initial_camera.look_at = AT
-        scene = Scene3D(server.scene, playback, bodies)
+    """`playback` as one HTML page that needs no server: the scene plays and can be turned."""
+    with _server(playback, bodies, 0) as (server, scene):
         scene.show(0.0)
         recording = server.get_scene_serializer()
         for frame in range(1, int(playback.end * EXPORT_RATE) + 2):
             recording.insert_sleep(1 / EXPORT_RATE)
             scene.show(frame / EXPORT_RATE)
         return str(recording.as_html())
-    finally:
-        with _silent():
-            server.stop()

@@ -78,13 +78,6 @@ def exact(successes: int, trials: int) -> Estimate:
     return Estimate(k / n, low, high, "exact")
 
 
-def below(trials: int) -> float:
-    """The upper limit of a rate of 0 in `trials`, one-sided at 95 %: "0/100, below 3.0 %"."""
-    if trials < 1:
-        raise ValueError("no trials bound no rate")
-    return float(1 - (1 - LEVEL) ** (1 / trials))
-
-
 def bounded_mean(value: float, trials: int) -> Estimate:
     """Interval of a mean of numbers in 0..1 of which only the mean is known (a printed PS).
 

@@ -120,8 +120,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSampl
         table.Item(asset, asset, standing(*place), variant, fixed=True)
         for (asset, variant), place in zip(things, places, strict=True)
     ]
-    scene_objects, names = table.named(rng, items)
-    return SceneSample(scene_objects, Facts(tuple(names[asset] for asset in ORDER[:level])))
+    return table.sample(rng, items, lambda n: Facts(tuple(n[asset] for asset in ORDER[:level])))
 
 
 def slots(scene: Scene) -> Slots:
@@ -167,8 +166,7 @@ def _draw_bells(level: int, rng: np.random.Generator, workcell: Workcell) -> Sce
         table.thing(f"bell {i}", "bell", point, params, fixed=True)
         for i, point in enumerate(points)
     ]
-    scene_objects, names = table.named(rng, items)
-    return SceneSample(scene_objects, Facts(tuple(names[item.role] for item in items)))
+    return table.sample(rng, items, lambda n: Facts(tuple(n[item.role] for item in items)))
 
 
 def _ring(

@@ -361,10 +361,8 @@ def _draw_counts(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
         turn, look = rng.uniform(-math.pi, math.pi), table.draw_variant(rng, "stapler")
         items.append(table.thing(f"stapler {i}", "stapler", (x, y), look, turn, fixed=True))
     counts = tuple(int(n) for n in rng.integers(1, MOST + 1, level))
-    scene_objects, names = table.named(rng, items)
-    return SceneSample(
-        scene_objects, CountsFacts(tuple(names[item.role] for item in items), counts)
-    )
+    roles = [item.role for item in items]
+    return table.sample(rng, items, lambda n: CountsFacts(tuple(n[r] for r in roles), counts))
 
 
 def _counts_goal(scene: Scene) -> PressCounts:

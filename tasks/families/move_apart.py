@@ -189,8 +189,7 @@ def _draw_cards(level: int, rng: np.random.Generator, workcell: Workcell) -> Sce
         table.thing(str(i), box.asset, box.place, box.params, yaw)
         for i, (box, yaw) in enumerate(zip(lying, free_turns(rng, workcell, lying), strict=True))
     ]
-    scene_objects, names = table.named(rng, items)
-    return SceneSample(scene_objects, CardsFacts(tuple(names[item.role] for item in items)))
+    return table.sample(rng, items, lambda n: CardsFacts(tuple(n[item.role] for item in items)))
 
 
 def _cards_goal(scene: Scene) -> Tracker:

@@ -127,8 +127,7 @@ def _draw(looks: Sequence[Block], rng: np.random.Generator, workcell: Workcell) 
             zip(looks, _places(looks, rng, workcell), strict=True)
         )
     ]
-    scene_objects, names = table.named(rng, items)
-    return SceneSample(scene_objects, Facts(tuple(names[item.role] for item in items)))
+    return table.sample(rng, items, lambda n: Facts(tuple(n[item.role] for item in items)))
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:

@@ -69,8 +69,7 @@ def _draw_stapler(level: int, rng: np.random.Generator, workcell: Workcell) -> S
     point, turn = (rng.uniform(*X), rng.uniform(*Y)), rng.uniform(-math.pi, math.pi)
     look = table.draw_variant(rng, "stapler")
     items = [table.thing("stapler", "stapler", point, look, turn, fixed=True)]
-    scene_objects, names = table.named(rng, items)
-    return SceneSample(scene_objects, StaplerFacts(names["stapler"], level))
+    return table.sample(rng, items, lambda n: StaplerFacts(n["stapler"], level))
 
 
 def _stapler_goal(scene: Scene) -> Checklist:
@@ -125,8 +124,7 @@ def _draw_bell(level: int, rng: np.random.Generator, workcell: Workcell) -> Scen
     else:
         x = rng.uniform(BELL_MIDDLE, min(BELL_FAR, high))
     items = [table.thing("bell", "bell", (x, y), variant, fixed=True)]
-    scene_objects, names = table.named(rng, items)
-    return SceneSample(scene_objects, BellFacts(names["bell"], level))
+    return table.sample(rng, items, lambda n: BellFacts(n["bell"], level))
 
 
 def _bell_goal(scene: Scene) -> Checklist:
@@ -243,8 +241,7 @@ def _draw_lifted(
     point, turn = (rng.uniform(*thing.x), rng.uniform(*thing.y)), rng.uniform(-thing.yaw, thing.yaw)
     look = table.draw_variant(rng, thing.asset, thing.variants)
     items = [table.thing("thing", thing.asset, point, look, turn)]
-    scene_objects, names = table.named(rng, items)
-    return SceneSample(scene_objects, LiftFacts(names["thing"], level))
+    return table.sample(rng, items, lambda n: LiftFacts(n["thing"], level))
 
 
 def _lift_goal(thing: Lifted, scene: Scene) -> Checklist:

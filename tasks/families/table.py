@@ -16,7 +16,7 @@ from robospa.tasks.sampling.places import LayoutError, Point
 from robospa.tasks.sampling.turns import Turnable
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.shapes import Color, ObjectModel, Params
-from robospa.tasks.task import Level, SceneFacts, Tracker
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Tracker
 from robospa.workcell import TABLE_TOP, Workcell
 
 COLORS: dict[str, Color] = {
@@ -93,6 +93,17 @@ def named(
             SceneObject(name, item.asset, item.pose, item.params, item.fixed, item.appears_at)
         )
     return tuple(scene_objects), names
+
+
+def sample(
+    rng: np.random.Generator,
+    items: Sequence[Item],
+    facts: Callable[[dict[str, str]], SceneFacts],
+    shift: tuple[float, float] = (0.0, 0.0),
+) -> SceneSample:
+    """The scene of `items`, named by chance, and its `facts`, made of the name of every role."""
+    scene_objects, names = named(rng, items)
+    return SceneSample(scene_objects, facts(names), shift)
 
 
 def draw_variant(

@@ -352,10 +352,8 @@ def _draw_bowls(level: int, rng: np.random.Generator, workcell: Workcell) -> Sce
     points = places.shuffled(rng, places.scatter(rng, propose, BOWLS_DISTANCE, restarts=RESTARTS))
     items = [table.thing("plate", "plate", plate, table.draw_variant(rng, "plate"), fixed=True)]
     items += [table.thing(str(i), "bowl", point, BOWL) for i, point in enumerate(points)]
-    scene_objects, names = table.named(rng, items)
-    return SceneSample(
-        scene_objects, BowlsFacts(names["plate"], tuple(names[str(i)] for i in range(level)))
-    )
+    bowls = [str(i) for i in range(level)]
+    return table.sample(rng, items, lambda n: BowlsFacts(n["plate"], tuple(n[b] for b in bowls)))
 
 
 def _bowls_plan(scene: Scene) -> tuple[Skill, ...]:

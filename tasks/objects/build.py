@@ -221,13 +221,9 @@ def box_grasps(hx: float, hy: float, z: float, tilt: float = 0.7) -> tuple[Grasp
     return tuple(found)
 
 
-def round_grasps(
-    width: float, z: float, tilt: float = 0.7, count: int = 4, start: float = 0.0
-) -> tuple[Grasp, ...]:
+def round_grasps(width: float, z: float, tilt: float = 0.7, count: int = 4) -> tuple[Grasp, ...]:
     """Grasps of something round, `width` thick at height `z`, closing every pi / `count`."""
-    return tuple(
-        top_grasp((0.0, 0.0, z), width, start + math.pi * i / count, tilt) for i in range(count)
-    )
+    return tuple(top_grasp((0.0, 0.0, z), width, math.pi * i / count, tilt) for i in range(count))
 
 
 RIM = 0.0064
@@ -248,13 +244,7 @@ def side_grasps(width: float, z: float, tilt: float = 0.4, count: int = 12) -> t
 
 
 def rim_grasps(
-    radius: float,
-    thickness: float,
-    z: float,
-    count: int = 8,
-    start: float = 0.0,
-    tilt: float = 0.5,
-    lean: float = 0.0,
+    radius: float, thickness: float, z: float, count: int = 8, lean: float = 0.0
 ) -> tuple[Grasp, ...]:
     """Grasps astride a round wall whose middle is `radius` from the axis at height `z`.
 
@@ -262,12 +252,12 @@ def rim_grasps(
     """
     found = []
     for i in range(count):
-        a = start + 2 * math.pi * i / count
+        a = 2 * math.pi * i / count
         c, s = math.cos(a), math.sin(a)
         point = (round(radius * c, 6), round(radius * s, 6), z)
         sink, rise = math.sin(lean), math.cos(lean)
         approach = (-sink * c, -sink * s, -rise)
-        found.append(Grasp(point, approach, (rise * c, rise * s, -sink), thickness, tilt))
+        found.append(Grasp(point, approach, (rise * c, rise * s, -sink), thickness, tilt=0.5))
     return tuple(found)
 
 
