@@ -164,8 +164,8 @@ def coloured(picture: NDArray[np.uint8], colour: str) -> list[float]:
 
 def by_colour(shown: Shown, skill: str = "pick") -> list[dict[str, Any]]:
     """Picks up what has the sentence's first colour; of several it stacks one on the other."""
-    names = [word for word in re.findall(r"\w+", shown.sentence) if word in HUES]
-    names = list(dict.fromkeys(names))
+    words = re.findall(r"\w+", shown.sentence)
+    names = list(dict.fromkeys(word for word in words if word in HUES)) or ["red"]
     if len(names) < 2:
         return [{"skill": skill, "at": coloured(shown.picture, names[0])}]
     placed = sum(text.count('"place"') for text in shown.texts)
