@@ -112,7 +112,7 @@ def _power(tasks: str, levels: str, base: float, run: str, as_json: bool) -> Non
         trials_for,
     )
     from robospa.results.records.runs import read_run
-    from robospa.results.scoring.usage import plan_line
+    from robospa.results.scoring.usage import usage_line
 
     variants = [(task, level) for task in parse_tasks(tasks) for level in parse_levels(levels)]
     models = published_variances(variants)
@@ -120,7 +120,7 @@ def _power(tasks: str, levels: str, base: float, run: str, as_json: bool) -> Non
     enough = {half: max(trials_for(v, half) for v in models.values()) for half in HALVES if models}
     gaps = {gap: sample_size(base, gap) for gap in GAPS if base + gap < 1}
     records = list(read_run(run).records.values()) if run else []
-    costs = [line for n in TRIALS if (line := plan_line(records, n * len(variants)))]
+    costs = [line for n in TRIALS if (line := usage_line(records, n * len(variants)))]
     if as_json:
         apart = [{"gap": gap, **asdict(needed)} for gap, needed in gaps.items()]
         found = {"half_widths": widths, "enough": enough, "differences": apart}

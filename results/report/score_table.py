@@ -26,7 +26,7 @@ from robospa.results.scoring.scores import (
     level_name,
     score_run,
 )
-from robospa.results.scoring.usage import usage_table
+from robospa.results.scoring.usage import usage_line, usage_table
 from robospa.results.statistics.intervals import Estimate
 from robospa.results.tables import (
     MISSING,
@@ -141,6 +141,8 @@ def print_scores(run: Run, results: ModelResults, beside: bool = True) -> None:
             show(table)
     console = plain_console(wide=130)
     console.print(_ends_line(run), style="dim", soft_wrap=True)
+    if used := usage_line(run.records.values()):
+        console.print(f"used: {used}", style="dim", soft_wrap=True)
     lines = [*missing_lines(scores), *loss_lines(run), *policy_error_lines(run)]
     odd = after_others([r for r in run.records.values() if finished(r)])
     for line in [

@@ -69,15 +69,17 @@ def _cells(sums: Mapping[str, float]) -> tuple[TableCell, ...]:
     return tuple(TableCell(f"{n:{styles.get(name, ',.0f')}}", n) for name, n in counts.items())
 
 
-def plan_line(records: Iterable[TrialRecord], trials: int) -> str:
-    """What `trials` trials like these would use, in a sentence; empty where no record says."""
+def usage_line(records: Iterable[TrialRecord], trials: int = 0) -> str:
+    """What `records` have used in a sentence, or what so many `trials` like these would use; empty
+    where no record says."""
     sums = total(records)
     if not sums:
         return ""
-    n = {name: value * trials / sums["trials"] for name, value in sums.items()}
-    tokens = f"{n['input_tokens']:,.0f} input and {n['output_tokens']:,.0f} output tokens"
-    each = sums["seconds"] / max(1, sums["requests"])
-    return (
-        f"{trials:,} trials like these {sums['trials']:,.0f} would use {n['requests']:,.0f} "
-        f"answers of {each:.1f} s and {tokens}, and cost {n['cost']:.2f}"
+    scale = trials / sums["trials"] if trials else 1.0
+    n = {name: f"{value * scale:,.0f}" for name, value in sums.items()}
+    what = (
+        f"{n['requests']} answers of {sums['seconds'] / max(1, sums['requests']):.1f} s, "
+        f"{n['input_tokens']} input and {n['output_tokens']} output tokens, "
+        f"cost {scale * sums['cost']:.2f}"
     )
+    return f"{trials:,} trials like these {sums['trials']:,.0f}: {what}" if trials else what

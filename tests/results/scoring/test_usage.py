@@ -29,7 +29,7 @@ def test_a_run_sums_what_its_trials_have_used_and_plans_with_it(tmp_path: Any) -
     assert texts == ["11", "30", "10", "0", "10,000", "500", "1.0200", "0.01", "0", "0.0927"]
     done = robospa("compare", made.folder, "--power", "--tasks", "GAC", "--json")
     costs = json.loads(done.out)["costs"]
-    assert len(costs) == 3 and "like these 11 would use" in costs[0]
+    assert len(costs) == 3 and "like these 11: " in costs[0]
 
 
 def test_a_run_of_another_policy_has_no_such_table(tmp_path: Any) -> None:
