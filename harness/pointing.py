@@ -39,7 +39,8 @@ def answer_question(run: TrialState, answers: PolicyCaller) -> str:
     name = run.parts.scene.everything[found].name if found >= 0 else ""
     right = name == asked_for(run.parts.tracker)
     feedback = "done" if right else "another object" if name else "nothing there"
-    run.calls.append({**plain_call(call), "step": 0, "feedback": feedback})
+    size = [camera.width, camera.height]
+    run.calls.append({**plain_call(call), "size": size, "step": 0, "feedback": feedback})
     if right:
         run.note((Event(0.0, "subtask_done", name, 0), Event(0.0, "success")))
     elif name:

@@ -3,7 +3,7 @@
 The world decides everything else, so a repeatable world gives the same record.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -22,9 +22,9 @@ from robospa.harness.trial import (
     trial_id,
 )
 from robospa.harness.world import JOINTS_FROM_EE, ActionError, Poll, StepResult, World
-from robospa.observation import Observation
+from robospa.observation import CameraSpec, Observation
 from robospa.protocol.errors import PolicyAnswerError
-from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
+from robospa.protocol.policy import POINT, Policy, PolicySpec, TrialInfo
 from robospa.results.records.manifest import read_manifest
 from robospa.results.records.runs import action_path, differences
 from robospa.results.records.trial_record import TrialRecord
@@ -67,6 +67,32 @@ class RecordedPolicy:
         return chunk
 
 
+class RecordedPoint:
+    """Points where a record says; its spec sees that picture alone."""
+
+    def __init__(self, call: Mapping[str, Any]) -> None:
+        camera = CameraSpec(call["camera"], *call["size"])
+        self.spec = PolicySpec("recorded", cameras=(camera,), state="none", action=POINT)
+        self._call = {name: call[name] for name in ("skill", "at", "camera")}
+
+    def reset(self, trial: TrialInfo) -> None:
+        """Nothing depends on the trial."""
+
+    def infer(self, observation: Observation) -> list[dict[str, object]]:
+        """The recorded point."""
+        return [self._call]
+
+
+def recorded_policy(
+    record: TrialRecord, actions: NDArray[np.float32], space: str
+) -> RecordedPolicy | RecordedPoint:
+    """What acts, or points, as the trial of `record` did."""
+    calls = record.diagnostics.get("calls") or [{}]
+    if calls[0].get("skill") == POINT:
+        return RecordedPoint(calls[0])
+    return RecordedPolicy(actions, space)
+
+
 class _Following:
     """A world that executes recorded joint actions in place of what it is sent."""
 
@@ -93,6 +119,7 @@ def replay(
     space: str,
     *,
     joints: NDArray[np.float32] | None = None,
+    of: TrialRecord | None = None,
     policy_seed: int = 0,
     recorder: Recorder | None = None,
     parts: Callable[[TrialKey], TrialSetup] = task_parts,
@@ -100,11 +127,12 @@ def replay(
 ) -> TrialRecord:
     """The record that `actions` give on `key` in `world`, with step limits of `step_scale`.
 
-    `joints` are joint actions to execute in their place, as an earlier run did.
+    `joints` are joint actions to execute in their place, as an earlier run did. The record that
+    they are `of` says what was pointed at where nothing was moved.
     """
     return run_trial(
         world if joints is None else cast(World, _Following(world, joints)),
-        RecordedPolicy(actions, space),
+        RecordedPolicy(actions, space) if of is None else recorded_policy(of, actions, space),
         key,
         policy_seed=policy_seed,
         recorder=recorder,
@@ -144,6 +172,7 @@ def replay_record(
         actions,
         space,
         joints=read_joints(path),
+        of=record,
         policy_seed=record.policy_seed,
         recorder=recorder,
         parts=parts,

@@ -83,8 +83,8 @@ class PolicySpecification(Struct, frozen=True):
 
     @property
     def space(self) -> str:
-        """The space of the recorded actions: skills are executed as joints, points not at all."""
-        return "joint" if self.action in TRACKS else self.action
+        """The space of the recorded actions: skills are executed as joints."""
+        return "joint" if TRACKS.get(self.action) == "skills" else self.action
 
 
 class PolicySettings(Struct, frozen=True, dict=True):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from robospa.harness.pointing import box_of, meant, point_on
+from robospa.harness.replay import replay
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import run_trial, task_parts
 from robospa.harness.world import OTHER, TABLE
@@ -15,6 +16,7 @@ from robospa.observation import CameraSpec
 from robospa.protocol.calls import check_calls
 from robospa.protocol.errors import PolicyAnswerError
 from robospa.protocol.policy import PolicySpec
+from robospa.results.records.runs import differences
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.grounding import choices_of
 from robospa.tasks.catalog import tasks
@@ -99,6 +101,9 @@ def test_answers_are_records_like_others(world: SapienWorld) -> None:
     other = ask(world, KEY, 1 - min(target, 1))
     assert (other.success, other.end, other.done) == (False, "done", 0)
     assert not choices_of(other)[0].right
+    for record in (right, other):
+        again = replay(world, KEY, np.zeros((0, 0), np.float32), "joint", of=record)
+        assert differences(record, again) == []
     empty = ask(world, KEY, TABLE)
     assert not empty.success and choices_of(empty) == []
     assert empty.diagnostics["calls"][0]["feedback"] == "nothing there"
