@@ -3,6 +3,8 @@
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from fake_runs import outcomes, write
@@ -219,3 +221,19 @@ def test_a_server_s_checks_as_json(
     assert found["url"] == server.url and found["passed"]
     assert {"name", "passed", "detail"} == set(found["checks"][0])
     assert machine["checks"] == [{"name": "simulator", "ok": True, "detail": "fine", "fix": ""}]
+
+
+def test_figures_are_drawn_of_all_columns(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[list[str], Path]] = []
+
+    def draw(runs: Any, columns: Any, folder: Path) -> list[SimpleNamespace]:
+        asked.append(([c.title for c in columns], folder))
+        return [SimpleNamespace(name="one")]
+
+    monkeypatch.setattr("robospa.results.report.report.draw_figures", draw)
+    code, out, _ = run_paper(capsys, "--out", str(tmp_path / "p"), "--format", "csv")
+    assert code == 0
+    assert asked == [(["RDT", "GO-1", "π0.5", "X-VLA"], tmp_path / "p" / "figures")]
+    assert "1 figures in" in out

@@ -125,6 +125,12 @@ def test_the_gallery_of_one_task_has_all_its_levels(tmp_path: Path) -> None:
     assert "5 variants in" in done.output and path.stat().st_size < 1_000_000
 
 
+def test_a_gallery_of_what_does_not_exist_is_refused_at_once(tmp_path: Path) -> None:
+    done = run("Pick_Blocks_Size,Pick_Nothing", "--gallery", "--out", str(tmp_path / "sheet.jpg"))
+    assert done.exit_code == 2 and "Pick_Nothing" in done.output
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_settled_scene_skips_seeds_that_do_not_rest() -> None:
     class Restless:
         seen: list[int]

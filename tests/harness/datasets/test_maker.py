@@ -13,6 +13,7 @@ from robospa.harness.datasets.maker import (
     EpisodeMaker,
     replay_end,
     subtask_of_frames,
+    subtask_texts,
 )
 from robospa.harness.datasets.manifest import DatasetManifest
 from robospa.harness.datasets.pack import pack
@@ -22,6 +23,7 @@ from robospa.harness.datasets.workers import EpisodeAttempt, EpisodeJob, attempt
 from robospa.harness.demonstrations.demonstration import DemonstrationWorld, demonstrate
 from robospa.harness.demonstrations.recorder import KEYFRAMES
 from robospa.harness.replay import ENDED
+from robospa.harness.trial import task_parts
 from robospa.observation import FEATURES, SLOTS, CameraSpec
 from robospa.protocol.policy import PolicySpec
 from robospa.tasks.events import Event
@@ -136,3 +138,10 @@ def test_keyframes_without_pictures_are_the_actions_that_the_expert_gave(tmp_pat
     assert np.array_equal(last, episode.environment_state[-1])
     pack("lerobot-v3", tmp_path / "set", [path], DatasetManifest("robospa collect", {}))
     assert verify(tmp_path / "set").problems == ()
+
+
+def test_texts_name_the_objects() -> None:
+    parts = task_parts(TrialKey("Place_Bowls_Plates", 2, 1_000_000, split="train"))
+    texts = subtask_texts(parts.tracker, parts.scene)
+    assert len(texts) == parts.tracker.total
+    assert texts[0].startswith(f"1 of {len(texts)}: the ") and "bowl" in texts[0]

@@ -17,6 +17,7 @@ from tiny_datasets import SIZE, painted, tiny_dataset, tiny_episode, written
 from robospa.action_space import ActionSpace
 from robospa.harness.convention_check.episodes import read_episode
 from robospa.harness.datasets import lerobot
+from robospa.harness.datasets import verify as verification
 from robospa.harness.datasets.episode import DatasetEpisode
 from robospa.harness.datasets.features import layout_of
 from robospa.harness.datasets.manifest import (
@@ -336,3 +337,10 @@ def test_colours_are_those_of_the_pixels() -> None:
         np.testing.assert_allclose(found[name], value.reshape(3, 1, 1), atol=1e-12)
     assert np.abs(found["q90"].ravel() - np.quantile(pixels, 0.9, axis=0)).max() <= 1 / 255
     assert found["count"].tolist() == [7]
+
+
+def test_another_suite_cannot_be_replayed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    tiny_dataset(tmp_path, count=2)
+    monkeypatch.setattr(verification, "SUITE", "robospa-9")
+    (problem,) = verify(tmp_path).problems
+    assert "of the suite robospa-3, and those of this version of robospa-9" in problem

@@ -626,3 +626,11 @@ def test_colours_are_the_pure_ones_of_their_task() -> None:
         found = switched(scene_switches(task, *items), 0, SWITCHES, unsaid=True).objects
         assert [o.params.get("color") for o in found] == [purple, [1.0, 0.0, 0.0], None]
         assert found[0].params["half"] == [0.02] * 3
+
+
+def test_the_microwave_floats() -> None:
+    items = block("a", "red"), SceneObject("m", "microwave", Pose((0.0, 0.1, 0.74)), fixed=True)
+    made = scene_switches("Click_Bell_Open_Microwave_Place_Object", *items, microwave="m")
+    found = switched(made, 0, chosen("floating-microwave"))
+    assert found.objects[0] is items[0]
+    assert found.objects[1].pose.position == pytest.approx((0.0, 0.1, 0.80))
