@@ -10,11 +10,9 @@ into ours silently, which is invisible on the wire.
 
     robospa serve openpi --option config=pi05_robotwin --option checkpoint=...
 
-A dataset `robospa/NAME` (the folder $HF_LEROBOT_HOME/robospa/NAME, format lerobot-v2.1) is trained
-on as `pi05_robospa_NAME`, all parameters, or `pi05_lora_robospa_NAME`. Neither name is in openpi's
-own list, so its scripts are started from here, in openpi's environment and folder:
-
-    python -m robospa.clients.openpi scripts/train.py pi05_robospa_NAME --exp-name=first
+A dataset `robospa/NAME` is trained on as `pi05_robospa_NAME`, all parameters, or
+`pi05_lora_robospa_NAME` (`docs/policies/pi05.md`). Neither name is in openpi's own list, so its
+scripts are started from here, in openpi's environment and folder.
 
 The names are those that `to_openpi` sends at evaluation. openpi's own Aloha configurations name no
 prompt among what they take from a dataset; without it, `prompt_from_task` has no effect.

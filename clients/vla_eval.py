@@ -1,11 +1,6 @@
 """vla-eval's model servers (AllenAI's evaluation harness), as its RoboTwin benchmark talks to them.
 
-    ours                    payload of `observation` (msgpack, arrays with text keys)
-    images.head             images.head_camera              (240, 320, 3) uint8 RGB, raw
-    images.left_wrist       images.left_camera
-    images.right_wrist      images.right_camera
-    state (14,)             joint_state                     float64
-    instruction             task_description
+Messages are msgpack, arrays in them with text keys; `encode` writes one observation.
 
 The server keeps the chunk and answers one action an observation, or a whole chunk if it was
 configured without chunking; both are understood. A trial begins with `episode_start`, which has no

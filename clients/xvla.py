@@ -1,16 +1,9 @@
 """X-VLA behind its own `deploy.py`: POST /act, JSON whose arrays are JSON texts themselves.
 
-    ours                   sent (each array as the text of its JSON object)
-    images.head            image0
-    images.left_wrist      image1
-    images.right_wrist     image2
-    ee (2, 8)              proprio (20,): per arm position, six of the rotation, gripper
-    instruction            language_instruction
-    options                domain_id, steps
-
-Answered are T x 20 absolute end-effector poses, executed as our `ee` actions; with `space=joint`
-T x 14 joint targets for a joint-space fine-tune. From the second query of a trial on, the state
-sent is not measured but the command executed last, as in X-VLA's own evaluation.
+`docs/policies/xvla.md` lists what is sent. Answered are T x 20 absolute end-effector poses,
+executed as our `ee` actions; with `space=joint` T x 14 joint targets for a joint-space fine-tune.
+From the second query of a trial on, the state sent is not measured but the command executed last,
+as in X-VLA's own evaluation.
 Errors inside the server are a bare HTTP 400 without a reason.
 
 `robospa serve xvla` runs the official class in this process instead: several trials in one call,

@@ -1,14 +1,8 @@
 """What the leaderboard keeps of a bundle: one small folder a submission, without actions and rows.
 
-    model.toml, bundle.txt    as handed in: the card; a bundle's address, size and hash
-    bundle.zip    the bundle itself, if it lies in the repository
-    manifest.json, model.json, run.json, scores.json, outcomes.json    as in the bundle
-    evidence.json    what `robospa submit verify` and `reproduce` wrote, and where the bundle is
-    trials.json      failure types by task, and the filmed trials
-    videos/          the announced sample
-
-The bundle's hash covers its files' hashes, so those files of a folder are held against it
-again, and all averages are computed anew. Refused: anything else, in one sentence.
+`docs/leaderboard.md` lists its files. The bundle's hash covers its files' hashes, so
+those of a folder are held against it again, and all averages are computed anew. Refused: anything
+else, in one sentence.
 
 A bundle that lies in the repository lets a clone verify it. Only a small one does, and only of a
 model whose weights a recipe of this repository remakes; all others stay at an address of their own.

@@ -168,7 +168,6 @@ BETTER = 0.8
 """To have learned anything, its error must be this much below that of holding still."""
 LEARNED = 0.6
 """With its mistake undone, a policy must be this much below holding still to have learned much."""
-KINDS = ("fits", "mistaken", "unclear")
 
 
 @dataclass(frozen=True)
@@ -205,7 +204,7 @@ class Guess:
 
 @dataclass(frozen=True)
 class Findings:
-    """The outcome. `kind` is one of KINDS; `best` is the guess to believe if it is "mistaken".
+    """The outcome. `kind` is "fits", "mistaken" or "unclear"; `best` is the guess if "mistaken".
 
     `groups` names the errors; `base` is the policy as it is, `still` one that would not move,
     `guesses` all single mistakes, the best first. `untried` says what could not be looked at.

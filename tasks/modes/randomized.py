@@ -1,17 +1,8 @@
 """Randomised scenes: the official variations of a scene's surroundings, each a part of its own.
 
-| part | what is drawn | strength |
-|---|---|---|
-| height | the table, and all on it, lower by 0 to | 0.03 m |
-| texture | an image on the wall and one on the table's top, each with probability | 0.98 |
-| light | colours of the lights; in 2 % of the scenes they change from picture to picture | 1 |
-| clutter | things on the table, of which none has to do with the task: at most | 10 |
-| camera | the head camera off its place by 0 to (off unless it is named, as officially) | 0.02 m |
-| white-table | the table's top white, as officially in clean scenes (off unless it is named) | 1 |
-
-Every part draws from a generator of its own: leaving one out, or changing its strength, leaves the
-others as they were. Evaluation takes unseen textures, training scenes (mode `randomized-seen`) seen
-ones; nothing else differs between the two.
+`docs/runs.md` lists the parts with their strengths. Every part draws from a generator of its own:
+leaving one out, or changing its strength, leaves the others as they were. Evaluation takes unseen
+textures, training scenes (mode `randomized-seen`) seen ones; nothing else differs.
 """
 
 from __future__ import annotations
