@@ -194,8 +194,8 @@ class SkillTrial:
         return False
 
     def _keep(self, order: ReadCall, feedback: str) -> None:
-        step = len(self.run.actions)
-        self.run.calls.append({**plain_call(order.call), "step": step, "feedback": feedback})
+        since = {"step": len(self.run.actions), "time": round(self.ws.snapshot.time, 3)}
+        self.run.calls.append({**plain_call(order.call), **since, "feedback": feedback})
 
     def _done(self, group: list[ReadCall]) -> list[str]:
         """Perform a call, or a pick with the place or drop after it; the feedback of each."""

@@ -126,7 +126,7 @@ class TrialState:
     last_problems: tuple[str, ...] = ()
     """What of the last action was executed otherwise than sent."""
     calls: list[dict[str, object]] = field(default_factory=list)
-    """Calls so far, each with its feedback and the actions executed before it."""
+    """Calls so far, each with its feedback and when it began."""
     last_joints: NDArray[np.float32] | None = None
     """The joint action that was executed in the place of the last one, if that was of poses."""
 

@@ -200,6 +200,7 @@ def measured(console: Console, target: Target, seconds: float) -> list[Load]:
     from rich.table import Table
 
     from robospa.harness.server_checks import CLIENTS, measure
+    from robospa.protocol.policy import SKILL
 
     with target.connect() as policy:
         if policy.spec.privileged:
@@ -211,6 +212,8 @@ def measured(console: Console, target: Target, seconds: float) -> list[Load]:
         table.add_row(str(load.clients), f"{load.per_second:.1f}", *shown)
     console.print("\nLatency of an answer, as its clients see it:")
     console.print(table)
+    if policy.spec.action == SKILL:
+        return loads
     console.print("In real time a robot alone at this server has")
     console.print(f"  --clock {loads[0].clock}", soft_wrap=True, highlight=False)
     for load in loads[1:]:

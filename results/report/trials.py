@@ -5,8 +5,11 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+
+from msgspec import Struct
 
 from robospa.results.failures.labels import NAMES, Failure
 from robospa.results.records.action_problems import described, trial_problems
@@ -14,6 +17,7 @@ from robospa.results.records.runs import VIDEOS, Run, film_name
 from robospa.results.records.trial_record import EventRow, TrialRecord
 from robospa.results.report.run_card import END_NAMES, NOT_RUN
 from robospa.results.scoring.first_choice import first_choice
+from robospa.schema import Number, read
 from robospa.trial import TrialKey
 
 SHOWN_TRIALS = 60_000
@@ -72,7 +76,7 @@ def _row(
         "message": record.message,
         "problems": trial_problems(record),
         "attempts": record.attempts if record.attempts > 1 else 0,
-        "events": [event_row(e, record) for e in record.events],
+        "events": happened(record),
         "digest": record.digest[:16],
         "video": video and video.relative_to(folder).as_posix(),
         "film": film_state(run, record) if video is None else "",
@@ -84,6 +88,27 @@ def _row(
             "at": failure.time,
         }
     return {name: value for name, value in row.items() if value not in ("", None, [])}
+
+
+class KeptCall(Struct):
+    """What the page shows of a call of a skill in a record."""
+
+    skill: str
+    feedback: str
+    time: Number = 0
+    at: tuple[Number, Number] | None = None
+
+
+def happened(record: TrialRecord) -> list[list[float | str]]:
+    """Events and calls of skills in the order of time; calls that are none are not shown."""
+    rows = [event_row(event, record) for event in record.events]
+    calls: list[KeptCall] = []
+    with suppress(ValueError):
+        calls = read(list[KeptCall], record.diagnostics.get("calls", []), "the calls")
+    for call in calls:
+        where = f" at {call.at[0]:.2f}, {call.at[1]:.2f}" if call.at else ""
+        rows.append([round(float(call.time), 2), f"called {call.skill}{where}:", call.feedback])
+    return sorted(rows, key=lambda row: float(row[0]))
 
 
 EVENT_WORDS = {

@@ -16,7 +16,7 @@ from robospa.results.records.trial_record import EventRow
 from robospa.results.report import score_table as tables
 from robospa.results.report.page import panels, write_report
 from robospa.results.report.report import make_report
-from robospa.results.report.trials import event_row
+from robospa.results.report.trials import event_row, happened
 from robospa.results.scoring.models import IncomparableError, results_of_run
 from robospa.results.statistics.intervals import Estimate, wilson
 
@@ -267,6 +267,11 @@ def test_an_event_in_words() -> None:
     assert event_row(closed, new) == [2.0, "gripper closed on", "the red cup"]
     step = EventRow(time=3.0, kind="subtask_done", object="", index=1, note="")
     assert event_row(step, new) == [3.0, "step 2 done", ""]
+    call = {"skill": "pick", "at": [0.25, 1], "time": 2, "step": 9, "feedback": "out of reach"}
+    said = replace(new, events=(step,), diagnostics={**new.diagnostics, "calls": [call]})
+    assert happened(said)[0] == [2.0, "called pick at 0.25, 1.00:", "out of reach"]
+    forged = replace(said, diagnostics={"calls": [{"skill": ["pick"]}]})
+    assert happened(forged) == [event_row(step, forged)]
 
 
 def test_runs_at_both_ends_are_marked_under_the_bootstrap_too(tmp_path: Path) -> None:
