@@ -9,8 +9,6 @@ nothing of a trial's sentence, target or plan: scenes are taken without their fa
 place and kind, for their names and order say nothing.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence

@@ -6,8 +6,6 @@ it so (a page from elsewhere cannot read it through another name), and serves tw
 and the run's videos. A button of that very page has a trial played in 3-D by a process of its own.
 """
 
-from __future__ import annotations
-
 import hashlib
 import re
 import subprocess

@@ -3,8 +3,6 @@
 `SapienWorld` (`robospa.harness.sim.sapien_world`) is the first implementation.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

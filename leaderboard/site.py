@@ -6,8 +6,6 @@ submissions on equal seeds are compared by a script that is loaded when they are
 and texts are escaped by Jinja or become text nodes. Refuses to write into a folder of other things.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import shutil

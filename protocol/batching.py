@@ -10,8 +10,6 @@ If a call of several observations fails, each is tried alone: one bad sample mus
 others.
 """
 
-from __future__ import annotations
-
 import asyncio
 import time
 from collections import deque

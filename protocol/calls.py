@@ -8,8 +8,6 @@ its right edge, v from 0 at its top edge to 1 at its bottom edge. It means the o
 there, or the table there. `robospa.harness.skill_calls` says what each skill does.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated
 

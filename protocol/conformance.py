@@ -6,8 +6,6 @@ two trials at once, a connection that goes away and comes back. It costs the ser
 of its model. A server that speaks openpi's dialect gets the checks that make sense there.
 """
 
-from __future__ import annotations
-
 import ssl as ssl_module
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor

@@ -24,8 +24,6 @@ Here too: text from other machines made safe for a terminal, a log and the recor
 policy's exception in words in which its author finds the line.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

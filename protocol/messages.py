@@ -10,8 +10,6 @@ Every request carries an id that its one answer repeats. Unknown fields are igno
 versions may add some), missing fields and wrong types are refused with DecodeError.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Annotated, ClassVar

@@ -12,8 +12,6 @@ its models (`robospa.clients.openpi`) take their names and layouts from here.
     instruction         prompt
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Mapping
 

@@ -6,8 +6,6 @@ are few, its choices. They are set in a URL (`go1+http://host:9000?wrists=swappe
 line (`robospa serve rdt --option ctrl_freq=25`) or in a JSON file, and checked here.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import types

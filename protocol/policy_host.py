@@ -14,8 +14,6 @@ A policy may have `end(outcome)` and `close()`. It is called from `threads` thre
 then it need not be thread-safe.
 """
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import itertools

@@ -6,8 +6,6 @@ keepalive pings (a server that computes for a minute is not dead; deadlines are 
 instead). A transport that failed once is closed and stays closed.
 """
 
-from __future__ import annotations
-
 import contextlib
 import ctypes
 import ipaddress

@@ -10,8 +10,6 @@ the caller's deadline. Every answer is paid for, so every answer is counted, als
 can use. The key comes from the environment; it is in no text that leaves this module.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

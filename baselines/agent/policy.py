@@ -9,8 +9,6 @@ is no list of calls is shown to the model with what is wrong with it, a few time
 ends as a policy error. A trial that has used up its requests, seconds or money ends with `done`.
 """
 
-from __future__ import annotations
-
 import base64
 import io
 import json

@@ -7,8 +7,6 @@ differences added up, is most likely that mistake. Hints, not verdicts: a model 
 in front of noise.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

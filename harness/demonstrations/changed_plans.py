@@ -9,8 +9,6 @@ that are free go anywhere, or the next object is dropped a little beside where i
 episode begins, and the expert does the rest.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from contextlib import suppress

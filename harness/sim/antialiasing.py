@@ -7,8 +7,6 @@ beyond the line. Corners have longer steps and stay sharp. In whole numbers and 
 edges: the same on every machine, and a tenth of what four samples a pixel cost a CPU.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -5,8 +5,6 @@ keeps the simulator's packed state, which SAPIEN copies in one call, and unpacks
 It does not change when the world moves on.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ written down here instead. Everything is plain numpy and knows nothing of the si
 nothing: actions are checked before they come here (`robospa.harness.action_decoder`).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -7,8 +7,6 @@ mesh and palette on the device. Meshes get one normal per corner: smooth across 
 across creases, so that a lathed can looks round and its rim does not.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 

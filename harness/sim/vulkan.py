@@ -5,8 +5,6 @@ or newer. So the loader is asked directly (ctypes, a handful of calls). Asking c
 if a driver is broken; `robospa.harness.machine_check` asks from a child process.
 """
 
-from __future__ import annotations
-
 import ctypes
 import ctypes.util
 import re

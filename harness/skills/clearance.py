@@ -8,8 +8,6 @@ arm and by which way round it is turned; below, it may be in the table long befo
 and the forearm follows it low over everything between the object and the robot.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@
 with the next object, and what can be done again is done again.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Mapping, Sequence
 from functools import partial
 

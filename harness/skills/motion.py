@@ -5,8 +5,6 @@ without a look at their collisions. Here the two are compared in the table's pla
 they would come near each other they move one after the other.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ The gripper closes across the handle, tipped down from level so that wrist and f
 of the table, and turns with the door by a share of its angle: a round handle lets it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass

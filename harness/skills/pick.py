@@ -4,8 +4,6 @@ Every candidate is an end-effector pose for one arm. Inverse kinematics runs on 
 what is left is ranked by tilt, by room for the fingers and by how far the arm has to go.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass

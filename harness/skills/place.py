@@ -1,7 +1,5 @@
 """Place, Drop and Pour: bring the held object somewhere and let go of it, or of what is in it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

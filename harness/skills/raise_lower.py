@@ -4,8 +4,6 @@ Two arms take the object's "left" and "right" frames and move in the same small 
 stays level. Between the lifts the grippers open where they are: nothing has to be approached anew.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import partial

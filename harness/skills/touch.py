@@ -1,7 +1,5 @@
 """Touching from above: Press with the closed gripper, Stamp with an object, Hit with a tool."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Generator

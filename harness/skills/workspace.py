@@ -7,8 +7,6 @@ A straight line in space is several joint lines, each of which starts and ends a
 is left out where the next one's joint line passes by it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Draws all figures that the given models and runs have data for, as SVG, PNG and PDF."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

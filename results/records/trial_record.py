@@ -1,7 +1,5 @@
 """The trial record: the unit of everything that is counted. Its annotations are a line's schema."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -4,8 +4,6 @@ Runs that cannot stand in one table (other embodiments, scenes, suites) still ge
 cards, and one sentence that says why there is no table.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

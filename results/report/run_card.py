@@ -1,7 +1,5 @@
 """The card of a run: what was evaluated, with what, where, and how its trials ended."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from itertools import compress

@@ -1,7 +1,5 @@
 """A run's scores as one table, and what is to be said below it: on a terminal and in a notebook."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
 from html import escape

@@ -6,8 +6,6 @@ turn. So of a spatial category SR@1 is the share of trials with a choice, times 
 (before chance is taken out), times the execution rate. `docs/statistics.md` has the limits.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
