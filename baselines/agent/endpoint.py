@@ -159,7 +159,8 @@ class ChatEndpoint:
                     self._why = str(error)
                 if self._free >= until:
                     raise
-            pause = min(2 * pause, LONGEST_PAUSE)
+                if not error.after:
+                    pause = min(2 * pause, LONGEST_PAUSE)
 
     def _wait(self, until: float) -> None:
         """Return when the endpoint may be asked; raises Away at `until`."""

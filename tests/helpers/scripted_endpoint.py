@@ -9,6 +9,7 @@ import json
 import random
 import re
 import threading
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -62,6 +63,7 @@ class ScriptedEndpoint:
         handler = type("Handler", (_Handler,), {"endpoint": self})
         self._server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
         self._server.daemon_threads = True
+        self._server.handle_error = lambda *gone: None  # type: ignore[method-assign]
         self._thread = threading.Thread(target=self._server.serve_forever, args=(0.01,))
         self._thread.start()
         self.url = f"http://127.0.0.1:{self._server.server_port}/v1"
@@ -81,6 +83,8 @@ class ScriptedEndpoint:
                 kind = self._random.choice(self.wrong)
             self.log.append((shown.sentence, kind))
             self.last = body
+        if kind == "slow":
+            time.sleep(1.5)
         if kind.isdecimal():
             return int(kind), {"error": {"message": "not now", "code": kind}}
         if kind in AWAY:
