@@ -3,7 +3,7 @@
 The world decides everything else, so a repeatable world gives the same record.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -70,10 +70,9 @@ class RecordedPolicy:
 class RecordedPoint:
     """Points where a record says; its spec sees that picture alone."""
 
-    def __init__(self, call: Mapping[str, Any]) -> None:
-        camera = CameraSpec(call["camera"], *call["size"])
+    def __init__(self, at: Sequence[float], camera: CameraSpec) -> None:
         self.spec = PolicySpec("recorded", cameras=(camera,), state="none", action=POINT)
-        self._call = {name: call[name] for name in ("skill", "at", "camera")}
+        self._call: dict[str, object] = {"skill": POINT, "at": at}
 
     def reset(self, trial: TrialInfo) -> None:
         """Nothing depends on the trial."""
@@ -89,7 +88,7 @@ def recorded_policy(
     """What acts, or points, as the trial of `record` did."""
     calls = record.diagnostics.get("calls") or [{}]
     if calls[0].get("skill") == POINT:
-        return RecordedPoint(calls[0])
+        return RecordedPoint(calls[0]["at"], CameraSpec(calls[0]["camera"], *calls[0]["size"]))
     return RecordedPolicy(actions, space)
 
 
