@@ -29,7 +29,7 @@ from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.skills.expert import Expert
 from robospa.observation import CameraSpec, Observation
 from robospa.protocol.options import option
-from robospa.protocol.policy import SKILL, PolicySpec, TrialInfo
+from robospa.protocol.policy import POINT, SKILL, PolicySpec, TrialInfo
 from robospa.tasks import plan as calls
 from robospa.workcell import HEIGHT, TABLE_TOP, WIDTH, WORKCELL
 
@@ -188,6 +188,9 @@ class LearnedCalls(Learned):
             self._take_over(self.belief, observation["calls"][-self._said :], seen)
         found = in_points(self._decided(self.belief), self.belief.state)
         self._said = len(found)
+        if self.spec.action == POINT:
+            at = [call["at"] for call in found if "at" in call] or [(0.5, 0.5)]
+            return [{"skill": POINT, "at": at[0]}]
         return found or [{"skill": "done"}]
 
     def _take_over(self, belief: Belief, said: Sequence[Call], seen: list[Seen]) -> None:
@@ -261,7 +264,7 @@ class LearnedOptions:
 
     path: str = option("", "folder of weights of robospa learn; empty for those that are shipped")
     eyes: bool = option(True, "no: told of the objects as numbers (privileged)")
-    action: str = option("joint", "skill: calls of skills at what it sees", ("joint", SKILL))
+    action: str = option("joint", "skill or point: at what it sees", ("joint", SKILL, POINT))
 
 
 class Learners:
@@ -281,7 +284,7 @@ class Learners:
         if options.eyes:
             eyes = perceive.load(folder)
             self._look = lambda observation: eyes.look(observation["images"]["head"])
-        self._kind = LearnedCalls if options.action == SKILL else Learned
+        self._kind = Learned if options.action == "joint" else LearnedCalls
         self.spec = PolicySpec(
             "learned" if options.eyes else "learned:eyes-off",
             action=options.action,
