@@ -40,7 +40,7 @@ from robospa.results.records.runs import Run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.first_choice import first_choice
 from robospa.results.scoring.repeats import was_repeated, with_repeated_failed
-from robospa.schema import pattern, read
+from robospa.schema import Sha256, pattern, read
 from robospa.tasks.scene import SUITE
 from robospa.tasks.seeds import ListKey
 from robospa.trial import CATEGORIES, DIMENSIONS, REFERENCE, TrialKey
@@ -59,7 +59,7 @@ class Block(Struct, frozen=True, forbid_unknown_fields=True):
     """Hidden seeds by "TASK/LEVEL"."""
 
     seeds: Annotated[dict[Place, Annotated[Seeds, Meta(min_length=1)]], Meta(min_length=1)]
-    salt: Annotated[str, pattern(rf"[0-9a-f]{{{2 * SALT}}}", f"{SALT} bytes in hexadecimal")]
+    salt: Sha256  # SALT bytes, as long as a hash
     suite: str = SUITE
     format: int = FORMAT
 

@@ -65,8 +65,9 @@ def check_ranges(options: object) -> None:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             continue
         bounds = next((m for k in _alternatives(hint) for m in _meta(k)), msgspec.Meta())
-        if not (math.isfinite(value) and _within(value, bounds)):
-            raise ValueError(f"{name} is {value:g}, and must be {_range(bounds)}")
+        finite = isinstance(value, int) or math.isfinite(value)
+        if not (finite and _within(value, bounds)):
+            raise ValueError(f"{name} is {str(value)[:40]}, and must be {_range(bounds)}")
 
 
 def _meta(hint: Any) -> list[msgspec.Meta]:

@@ -45,7 +45,8 @@ _WORDS: dict[str, str] = {}
 def pattern(regex: str, words: str) -> Meta:
     """The rule that a text matches `regex` as a whole; `words` say what that means."""
     whole = rf"^(?:{regex})\Z"
-    _WORDS[repr(whole)] = words
+    if _WORDS.setdefault(repr(whole), words) != words:
+        raise ValueError(f"the pattern {regex} is called {_WORDS[repr(whole)]!r} already")
     return Meta(pattern=whole)
 
 

@@ -159,7 +159,7 @@ def test_a_block_is_read_back_under_its_commitment_and_never_written_over(tmp_pa
     ("change", "words"),
     [
         ({"format": 1}, "format 2"),
-        ({"salt": "short"}, "'salt' must be 32 bytes"),
+        ({"salt": "short"}, "'salt' must be 64 hexadecimal"),
         ({"suite": "robospa-9"}, "no block of"),
         ({"seeds": {}}, "'seeds'"),
         ({"seeds": {"Pick_Blocks_Size/1": [100000]}}, "1000000000"),

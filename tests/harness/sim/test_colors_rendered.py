@@ -44,7 +44,7 @@ def renderer() -> Renderer:
 @cache
 def usual_camera_of(renderer: Renderer) -> sapien.render.RenderCameraComponent:
     """A head camera with SAPIEN's own shader, which tells what each pixel shows."""
-    head = renderer._cameras[HEAD.name, HEAD.width, HEAD.height]
+    head = next(made for (spec, _), made in renderer._cameras.items() if spec == HEAD)
     camera = new_camera(renderer._scene, HEAD.width, HEAD.height, shader="")
     camera.set_fovy(head.fovy, compute_x=True)
     camera.near, camera.far = head.near, head.far
