@@ -137,6 +137,7 @@ def test_every_option_is_explained_and_round_trips(dialect: Dialect) -> None:
         "go1+http://h?wrists=left",
         "go1+http://h?ctrl_freq=0",
         "go1+http://h?horizon=0",
+        f"go1+http://h?horizon={10**400}",
         "go1+http://h?horizon=30&execute=31",
         "go1+http://h?wrist=swapped",
         "go1+http://h?horizon=1&horizon=2",
