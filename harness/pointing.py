@@ -53,15 +53,20 @@ def asked_for(tracker: Tracker) -> str:
     return next(name for name, role in tracker.roles.items() if role.subtasks)
 
 
-def meant(shown: NDArray[np.int16], at: Sequence[float]) -> int:
+def meant(
+    shown: NDArray[np.int16], at: Sequence[float], usable: NDArray[np.bool_] | None = None
+) -> int:
     """What the point [u, v] in a picture is on, as `World.identify` numbers it: the object there,
-    else the nearest one within RADIUS, else what is there."""
+    else the nearest one within RADIUS, else what is there. `usable` says which pixels count, where
+    these are not those of all objects."""
     height, width = shown.shape
     column, row = at[0] * width, at[1] * height
-    here = int(shown[min(int(row), height - 1), min(int(column), width - 1)])
-    if here >= 0:
+    usable = shown >= 0 if usable is None else usable
+    pixel = min(int(row), height - 1), min(int(column), width - 1)
+    here = int(shown[pixel])
+    if usable[pixel]:
         return here
-    rows, columns = np.nonzero(shown >= 0)
+    rows, columns = np.nonzero(usable)
     far = np.hypot(columns + 0.5 - column, rows + 0.5 - row)
     if not len(far) or far.min() > RADIUS * width:
         return here

@@ -18,20 +18,19 @@ from numpy.typing import NDArray
 
 from robospa.action_space import ARMS, quantize
 from robospa.geometry import Pose, Vec3, rotate
+from robospa.harness.pointing import meant
 from robospa.harness.policy_calls import PolicyCaller
 from robospa.harness.skills import Expert, SkillFailed
 from robospa.harness.skills.motion import go_home
 from robospa.harness.skills.pick import arms_for
 from robospa.harness.skills.workspace import Steps, Workspace
 from robospa.harness.trial import TrialState
-from robospa.harness.world import OTHER, TABLE
+from robospa.harness.world import TABLE
 from robospa.observation import CameraSpec
 from robospa.protocol.calls import Call, Point, plain_call, read_calls
 from robospa.protocol.policy import PolicySpec
 from robospa.tasks import plan
 
-RADIUS = 0.02
-"""How far from a point, as a share of the picture's width, what is meant may be drawn."""
 LOST = 0.05
 """A held thing this much farther [m] from the fingers than it is large has slipped out."""
 EXCHANGE = tuple(
@@ -144,7 +143,7 @@ class SkillTrial:
     def _meant(
         self, point: Point, camera: CameraSpec, seen: NDArray[np.int16], place: bool
     ) -> Meant:
-        """The object drawn at `point`, or nearest to it within RADIUS; for a `place`, which leaves
+        """The object drawn at `point`, or nearest to it (`meant`); for a `place`, which leaves
         out what is held, also the table."""
         scene = self.run.parts.scene
         height, width = seen.shape
@@ -156,14 +155,10 @@ class SkillTrial:
             if held and int(seen[_pixel(point, width, height)[::-1]]) in held:
                 return Meant(spot=ground)
             usable &= ~np.isin(seen, held)
-        column, row = _pixel(point, width, height)
-        reach = max(1, round(RADIUS * width))
-        rows, columns = np.nonzero(usable)
-        away = (rows - row) ** 2 + (columns - column) ** 2
-        if not len(away) or away.min() > reach**2:
-            return Meant()
-        found = int(seen[rows[away.argmin()], columns[away.argmin()]])
-        return Meant(spot=ground) if found in (TABLE, OTHER) else Meant(names[found])
+        found = meant(seen, point, usable)
+        if found >= 0:
+            return Meant(names[found])
+        return Meant(spot=ground) if found == TABLE and place else Meant()
 
     # -- what is done --------------------------------------------------------------------------
 
