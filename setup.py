@@ -1,4 +1,4 @@
-"""The source archive is the repository; everything else is in pyproject.toml.
+"""The source archive is the repository, and PyPI's page its README; all else is in pyproject.toml.
 
 `robospa/` links to the folders beside it. Left alone, setuptools would follow the links and pack
 copies, and Makefile, tests and documentation would not find the folders that they name.
@@ -7,6 +7,7 @@ copies, and Makefile, tests and documentation would not find the folders that th
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -24,4 +25,20 @@ class SourceArchive(sdist):
                 (Path(base_dir) / link).symlink_to(os.readlink(link))
 
 
-setup(cmdclass={"sdist": SourceArchive})
+def page() -> str:
+    """README.md for PyPI, whose links to files of the repository would lead nowhere: they lead to
+    the release's tag once a workflow on GitHub names repository and tag."""
+    text = Path("README.md").read_text()
+    repository, tag = os.environ.get("GITHUB_REPOSITORY"), os.environ.get("GITHUB_REF_NAME")
+    if not (repository and tag):
+        return text
+    at = f"https://github.com/{repository}"
+    text = re.sub(r"(!\[[^]]*\]\()(?!http)", rf"\1{at}/raw/{tag}/", text)
+    return re.sub(r"((?<!!)\[[^]]*\]\()(?!http)(?=[^)#])", rf"\1{at}/blob/{tag}/", text)
+
+
+setup(
+    cmdclass={"sdist": SourceArchive},
+    long_description=page(),
+    long_description_content_type="text/markdown",
+)
