@@ -20,7 +20,7 @@ HOST = re.compile(r"(?:https?|file)://(?!127\.0\.0\.1|localhost)[^\s\"']+")
 
 
 def _build(folder: Path, kind: str, out: Path) -> Path:
-    """The archive of `kind` that setuptools makes of the sources in `folder`."""
+    """The archive of `kind` that setuptools makes of the sources in `folder`, as a release."""
     call = f"from setuptools import build_meta as b; print(b.build_{kind}({str(out)!r}))"
     done = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", call],
@@ -28,7 +28,7 @@ def _build(folder: Path, kind: str, out: Path) -> Path:
         capture_output=True,
         text=True,
         timeout=120,
-        env={**os.environ, "PYTHONPATH": ""},
+        env={**os.environ, "PYTHONPATH": "", "GITHUB_REPOSITORY": "a/b", "GITHUB_REF_NAME": "v1"},
     )
     assert done.returncode == 0, done.stderr
     return out / done.stdout.splitlines()[-1]
@@ -72,7 +72,12 @@ def test_a_wheel_of_the_source_archive_has_every_file_of_the_package(unpacked: P
     expected = {name for name in expected if "/submissions/" not in name}  # data of the site
     with zipfile.ZipFile(_build(unpacked, "wheel", unpacked.parents[1])) as wheel:
         packed = {name for name in wheel.namelist() if ".dist-info/" not in name}
+        (about,) = (name for name in wheel.namelist() if name.endswith("/METADATA"))
+        page = wheel.read(about).decode()
     assert packed == expected
+    links = re.findall(r"(!?)\[[^]]*\]\(([^)]+)\)", page)
+    assert [link for _, link in links if not link.startswith("https://")] == []
+    assert {link.split("/")[5] for image, link in links if image} == {"raw"}
 
 
 @pytest.mark.parametrize("name", ["Makefile", "scripts/setup.sh", "scripts/models.sh"])
@@ -85,7 +90,7 @@ def test_a_release_is_of_the_version_that_its_tag_names() -> None:
     """The workflow compares lines of these files with the tag; they have to look like that."""
     version = re.search(r'^version = "([\d.]+)"$', (ROOT / "pyproject.toml").read_text(), re.M)
     assert version is not None
-    assert f"version: {version[1]}\n" in (ROOT / "CITATION.cff").read_text()
+    assert f"\n## [{version[1]}]" in (ROOT / "CHANGELOG.md").read_text()
     workflow = (ROOT / ".github" / "workflows" / "release.yml").read_text()
     assert "id-token: write" in workflow and "vars.PUBLISH_TO_PYPI == 'yes'" in workflow
     assert not re.search(r"secrets\.|password:|PYPI_TOKEN", workflow), "no stored password"
