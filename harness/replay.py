@@ -137,6 +137,7 @@ def replay(
         recorder=recorder,
         parts=parts,
         step_scale=step_scale,
+        replayed=True,
     )
 
 

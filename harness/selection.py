@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -114,6 +115,9 @@ def list_trials(selection: Selection) -> list[TrialKey]:
     tasks, levels = parse_tasks(selection.tasks), parse_levels(selection.levels)
     if selection.seeds is None:
         _check_lists(selection, tasks, levels)
+    if selection.profile is not None:
+        clean = list_trials(replace(selection, profile=None))
+        return [*clean, *profile_trials(clean, selection.profile)]
     return [
         TrialKey(task, level, seed, robot, mode, split)
         for robot in parse_embodiments(selection.embodiment)
@@ -123,6 +127,25 @@ def list_trials(selection: Selection) -> list[TrialKey]:
         for task in tasks
         for level in levels
         for seed in first_seeds(seeds, task, level, selection.trials, selection.seeds is not None)
+    ]
+
+
+def profile_trials(clean: Sequence[TrialKey], text: str) -> list[TrialKey]:
+    """The trials `clean` once more with each of the axes in `text`: the same seeds in all of them.
+    Procedures have no single target, so none is asked for another. SettingsError if it names
+    none."""
+    from robospa.tasks.catalog import task
+    from robospa.tasks.modes.randomized import axes
+
+    try:
+        chosen = axes(text)
+    except ValueError as error:
+        raise SettingsError(str(error)) from error
+    return [
+        replace(key, mode=canonical_mode(f"randomized:{name}={strength:g}"))
+        for name, strength in chosen
+        for key in clean
+        if name != "other-target" or task(key.task).dimension != "procedural"
     ]
 
 
@@ -173,7 +196,8 @@ def seed_sources(selection: Selection, keys: Sequence[TrialKey]) -> list[dict[st
     found: dict[tuple[str, str, str], dict[ListKey, Sequence[int]]] = {}
     seeds: dict[ListKey, list[int]] = {}
     for key in keys:
-        place = ListKey(key.task, key.level, key.embodiment, key.mode)
+        mode = key.mode if selection.profile is None else "clean"
+        place = ListKey(key.task, key.level, key.embodiment, mode)
         if key.seed not in (used := seeds.setdefault(place, [])):  # of another split
             used.append(key.seed)
     for place, used in seeds.items():

@@ -56,7 +56,7 @@ Value = bool | int | float | str | list[str] | None
 G = TypeVar("G")
 
 
-LISTS = ("tasks", "levels", "seeds", "embodiment", "mode", "split", "cameras")
+LISTS = ("tasks", "levels", "seeds", "embodiment", "mode", "split", "cameras", "profile")
 """Texts that may also be given as lists: ["GAC", "RPF"] is "GAC,RPF"."""
 
 
@@ -84,6 +84,11 @@ class Selection:
     mode: str = option(
         "clean", "scene modes: clean, randomized, or parts of it: randomized:light,clutter"
     )
+    profile: str | None = option(
+        None,
+        "what each axis costs, beside clean scenes of the same seeds: all, words, eyes, hands, "
+        "scene, or axes such as blur,noise=30",
+    )
     instructions: Path | None = option(
         None,
         "folder of a RoboSPA checkout whose sentences replace ours: those to test with for "
@@ -95,6 +100,10 @@ class Selection:
         _check(
             self.instructions is None or "indirect" not in self.split.split(","),
             "split indirect has no official sentences: leave it or instructions out",
+        )
+        _check(
+            self.profile is None or self.mode == "clean",
+            "a profile has scene modes of its own: leave mode out",
         )
 
 

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from robospa.action_space import quantize
 from robospa.harness.clock.policy_clock import PolicyClock
 from robospa.harness.clock.real_time import RealTime
+from robospa.harness.effects import Effects
 from robospa.harness.policy_calls import PolicyCaller, Stopwatch, answer_times
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.embodiment import Embodiment
@@ -116,6 +117,9 @@ class TrialState:
     event_steps: list[int] = field(default_factory=list)
     """For every event the number of actions started by then."""
     actions: list[NDArray[np.float32]] = field(default_factory=list)
+    replayed: bool = False
+    """Whether its actions are those of a record, on which the scene's mode has acted already."""
+    effects: Effects = field(init=False)
     past: dict[int, View] = field(default_factory=dict)
     """Views that history offsets may ask for, by the number of actions executed then."""
     physics_steps: int = 0
@@ -133,7 +137,12 @@ class TrialState:
     def load(self, split: str) -> None:
         """Bring the scene to rest, its sentence of `split`; raises SceneUnstable."""
         world, tracker, scene = self.world, self.parts.tracker, self.parts.scene
+        self.effects = Effects(scene)
         self.stopwatch.call("loading", world.load, scene, tracker.needs_contacts)
+        if "start" in scene.strengths:
+            state = world.observe(PolicySpec("start", cameras=(), state="commanded"))["state"]
+            action = self.effects.start(state, self.robot.action_space("joint"))
+            world.step(quantize(action), "joint", lambda snapshot: False)
         if isinstance(world, TellsInstruction):
             self.parts = replace(self.parts, instruction=world.instruction(split))
         if tracker.roles:
@@ -193,13 +202,13 @@ class TrialState:
         """The observation of this instant that `spec` asks for."""
         step = len(self.actions)
         view: Observation = self.stopwatch.call("rendering", self.world.observe, spec)
-        observation = view.copy()
+        observation = self.effects.seen(view, step).copy()
         observation["instruction"] = self.parts.instruction
         observation["step"] = step
         if spec.action in CALLED:
             observation["calls"] = [dict(call) for call in self.calls]
         if spec.history:
-            self.past[step] = _images_and_state(view)
+            self.past[step] = _images_and_state(observation)
             observation["history"] = {
                 offset: self.past[max(step + offset, 0)] for offset in spec.history
             }
@@ -216,20 +225,21 @@ class TrialState:
         step = len(self.actions)
         if step not in self.past and any(step - offset >= next_query for offset in spec.history):
             plain = replace(spec, privileged=False, environment_state=False)
-            self.past[step] = _images_and_state(
-                self.stopwatch.call("rendering", self.world.observe, plain)
-            )
+            view: Observation = self.stopwatch.call("rendering", self.world.observe, plain)
+            self.past[step] = _images_and_state(self.effects.seen(view, step))
 
     def checked(self, answer: object, spec: PolicySpec) -> NDArray[np.float32]:
         """The chunk that `spec` promises, as wide as this trial's robot takes it, quantised as it
         is executed; raises PolicyAnswerError."""
         chunk = check_chunk(answer, spec)
-        width = self.robot.action_space(spec.action).width
-        if chunk.shape[1] != width:
+        space = self.robot.action_space(spec.action)
+        if chunk.shape[1] != space.width:
             raise PolicyAnswerError(
                 f"the policy answered {chunk.shape[1]} numbers per action, but a {spec.action} "
-                f"action of {self.robot.name} has {width}"
+                f"action of {self.robot.name} has {space.width}"
             )
+        if not self.replayed:
+            chunk = self.effects.acted(chunk, len(self.actions), space)
         return quantize(chunk)
 
     def execute(self, action: NDArray[np.float32], space: str) -> bool:
@@ -367,18 +377,21 @@ def run_trial(
     step_scale: float = 1.0,
     clock: PolicyClock | None = None,
     processor: Callable[[], float] = time.process_time,
+    replayed: bool = False,
 ) -> TrialRecord:
     """Run the trial `key` to its end and return its record.
 
     `policy_seed` and `trial_id` are what the policy is sent (`robospa.harness.trial`).
     `step_scale` multiplies the task's step limit; anything but 1 departs from the benchmark.
     `clock`: a real one, in a `world` whose actions take its period; None for the paused one.
-    `processor` tells its time [s] where several trials share a process.
+    `processor` tells its time [s] where several trials share a process. `replayed`: `policy` sends
+    what a record says was executed.
     A PolicyError and an ActionError end the trial; whatever else `policy` or `world` raise is
     passed on. `world` may be used for any other trial before and after.
     """
     started, busy = time.perf_counter(), processor()
     run, answers = open_trial(world, key, parts(key), recorder), PolicyCaller(policy)
+    run.replayed = replayed
     info = TrialInfo(
         task=key.task,
         embodiment=key.embodiment,
@@ -388,6 +401,7 @@ def run_trial(
         key=key if policy.spec.needs_trial_key else None,
         joints=run.robot.action_space("joint").joints,
     )
+    clock = run.effects.timed(clock)
     real = None if clock is None else RealTime(run, answers, clock, policy_seed)
     limit = step_limit(run.parts.task, key.level, step_scale)
     end, message = _play(run, answers, info, limit, real)

@@ -366,12 +366,12 @@ Images = dict[str, object]
 QUALITY = 90
 
 
-def encode_jpeg(image: NDArray[np.uint8]) -> bytes:
-    """uint8 (H, W, 3) RGB to JPEG, quality 90, 4:2:0. Raises EncodeError."""
+def encode_jpeg(image: NDArray[np.uint8], quality: int = QUALITY) -> bytes:
+    """uint8 (H, W, 3) RGB to JPEG of `quality`, 4:2:0. Raises EncodeError."""
     if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3 or not image.size:
         raise EncodeError(f"{image.dtype} array of shape {image.shape} cannot become a JPEG")
     stream = io.BytesIO()
-    _pillow().fromarray(np.ascontiguousarray(image)).save(stream, "JPEG", quality=QUALITY)
+    _pillow().fromarray(np.ascontiguousarray(image)).save(stream, "JPEG", quality=quality)
     return stream.getvalue()
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robospa.extras import need
+from robospa.results.comparison.profile import Profile, profile_of
 from robospa.results.failures.labels import NAMES, FailedTrials, failed_trials, label
 from robospa.results.records.action_problems import KINDS, described
 from robospa.results.records.runs import Run, finished, read_run
@@ -62,6 +63,11 @@ class LoadedRun(Run):
         """What was chosen and what came of it, by task, category or dimension, and level (0:
         all): `run.grounding()["GAC", 0].execution` (`docs/statistics.md`)."""
         return groundings(r for r in self.records.values() if finished(r))
+
+    def profile(self, metric: str = "sr1", by: str = "all") -> Profile:
+        """What each axis of a profile costs, paired with the clean trials; `by` "category", "level"
+        or "task": `print(run.profile())` (`docs/profile.md`). RunError without axes."""
+        return profile_of(self, metric, by)
 
     def failures(self) -> FailedTrials:
         """A list of every failed trial with the type of its failure and the evidence for it;

@@ -22,6 +22,7 @@ import numpy as np
 
 from robospa.tasks import catalog
 from robospa.tasks.instructions import SENTENCES, SPLITS, Templates, fill, slot_names
+from robospa.tasks.modes.wording import REWORDED, about_nothing_here, reworded
 from robospa.tasks.objects import object_model
 from robospa.tasks.scene import Scene
 
@@ -57,9 +58,20 @@ def sentences(scene: Scene, split: str, salt: str = "") -> tuple[str, ...]:
 
 
 def instruction(scene: Scene, split: str = "heldout", salt: str = "") -> str:
-    """The sentence of this trial: one of `sentences(scene, split, salt)`, each equally likely."""
+    """The sentence of this trial: one of `sentences(scene, split, salt)`, each equally likely, or
+    what the scene's mode makes of it."""
+    if "no-sentence" in scene.strengths:
+        return ""
+    split = "indirect" if "indirect" in scene.strengths else split
+    made = sentences(scene, split, salt)
     index = int(_generator(scene, split, "instruction", salt).integers(SENTENCES))
-    return sentences(scene, split, salt)[index]
+    if "nothing-here" in scene.strengths:
+        return about_nothing_here(scene, _generator(scene, split, "nothing here", salt))
+    if axis := next((name for name in REWORDED if name in scene.strengths), ""):
+        share = SENTENCES // len(templates(scene.task, scene.level)[_split_index(split)])
+        rng = _generator(scene, split, axis, salt)
+        return reworded(made, index, share, axis, scene.strengths[axis], rng)
+    return made[index]
 
 
 def _fillings(

@@ -97,6 +97,7 @@ def run_and_show(request: Request, *, as_json: bool = False) -> None:
 
     Scores are a table, or as JSON one object on standard output.
     """
+    from robospa.results.comparison.profile import profile_of
     from robospa.results.records.runs import by_setting, read_run
     from robospa.results.report.score_table import print_scores
     from robospa.results.scoring.models import results_of_run
@@ -118,6 +119,8 @@ def run_and_show(request: Request, *, as_json: bool = False) -> None:
     run = read_run(folder)
     if as_json:
         print_json({"folder": folder, **run_data(run)})
+    elif run.manifest.settings.profile:
+        print(profile_of(run))
     else:
         for part in by_setting(run):
             print_scores(part, results_of_run(part), beside=False)
@@ -144,11 +147,14 @@ def run_data(run: Run) -> dict[str, object]:
 
     Of several robots or scene modes there are `parts` instead, by their names.
     """
+    from robospa.results.comparison.profile import profile_of
     from robospa.results.records.action_problems import problem_data
     from robospa.results.records.runs import by_setting, setting_name
     from robospa.results.report.run_card import ends
     from robospa.results.scoring.scores import score_run, to_json
 
+    if run.manifest.settings.profile:
+        return {"profile": profile_of(run).to_json()}
     if len(parts := by_setting(run)) > 1:
         return {"parts": {setting_name(part): run_data(part) for part in parts}}
     counts = {"trials": len(run.keys), "missing": len(run.missing), "ends": ends(run)}

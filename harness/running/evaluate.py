@@ -163,6 +163,7 @@ def make_manifest(request: Request, policies: Mapping[str, ProbedPolicy]) -> Run
         policies={task: p.settings() for task, p in policies.items()} if several else {},
         instructions="" if official is None else official.digest,
         layout=layout,
+        profile=request.arguments.get("profile") is not None,
     )
     about = structs.replace(
         about_machine(world),

@@ -143,7 +143,8 @@ class RunSettings(Struct, frozen=True):
     exact state. `needs_trial_key`: it is sent what names the scenes. `step_scale` multiplies the
     official step limits. `run_seed`: ids and policy seeds follow from it; a secret during the run,
     unless it was given. `shuffled_instructions`: every trial has the sentence of another scene.
-    `salt_sha256` is of hidden scenes. `instructions`: hash of official sentences.
+    `salt_sha256` is of hidden scenes. `instructions`: hash of official sentences. `profile`: its
+    trials measure what axes cost.
     """
 
     embodiment: tuple[SettingName, ...] = ()
@@ -161,6 +162,7 @@ class RunSettings(Struct, frozen=True):
     policies: dict[str, PolicySettings] = {}
     instructions: str = ""
     layout: LayoutSettings | None = None
+    profile: bool = False
 
     @property
     def stated(self) -> list[PolicySpecification]:
@@ -335,6 +337,8 @@ def departures(manifest: RunManifest) -> tuple[Departure, ...]:
     if settings.shuffled_instructions:
         words = "an ablation, every trial has the sentence of another scene"
         found.append(Departure("shuffled sentences", words))
+    if settings.profile:
+        found.append(Departure("profile", "trials of what axes cost, beside clean ones"))
     if manifest.clock:
         found.append(Departure(REAL_TIME, f"{manifest.clock}, a suite of its own"))
     if parts := [mode for mode in settings.mode if ":" in mode]:
@@ -348,6 +352,7 @@ def departures(manifest: RunManifest) -> tuple[Departure, ...]:
 
 OPTIONAL_SETTINGS = (
     *("shuffled_instructions", "clock", "salt_sha256", "policies", "instructions", "layout"),
+    *("profile",),
 )
 OPTIONAL_ABOUT = ("git", "policy", "policies", "arguments", "seeds", "instructions")
 

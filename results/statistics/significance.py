@@ -75,6 +75,17 @@ def benjamini_hochberg(chances: Sequence[float]) -> list[float]:
     return found
 
 
+def holm(chances: Sequence[float]) -> list[float]:
+    """Each p corrected by Holm: calling those below 0.05 different, any of them is a false alarm in
+    at most one table of twenty."""
+    order = sorted(range(len(chances)), key=lambda n: chances[n])
+    found, largest = [1.0] * len(chances), 0.0
+    for place, index in enumerate(order):
+        largest = max(largest, chances[index] * (len(chances) - place))
+        found[index] = min(1.0, largest)
+    return found
+
+
 RateOrEstimate = Sample | Estimate | None
 """A cell of a table: outcomes of a variant, an average with its interval, or nothing."""
 

@@ -177,6 +177,14 @@ class Facts(table.PickFacts):
     reference_label: str
 
 
+def label_in(scene: Scene, name: str) -> str:
+    """How the place of an object is called in the layout of `scene`, whose lines are straight."""
+    at = {item.name: item.pose.position for item in scene.objects}
+    x, y = [sorted({round(p[k], 4) for p in at.values()}) for k in (0, 1)]
+    cells = {n: (x.index(round(p[0], 4)), y.index(round(p[1], 4))) for n, p in at.items()}
+    return _label(SHAPES[scene.level], cells[name], list(cells.values()))
+
+
 def drawer(crowd: Crowd) -> Draw:
     """The draw of `crowd`: direction and target slot, other slots, a straight layout, turns."""
 

@@ -16,7 +16,7 @@ import itertools
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -89,6 +89,17 @@ def clutter(
         name = f"clutter_{len(placed)}"
         placed.append(SceneObject(name, kind.asset, pose, params, fixed=kind.fixed))
     return tuple(placed)
+
+
+def look_alikes(scene: Scene, rng: np.random.Generator, most: int) -> tuple[SceneObject, ...]:
+    """At most `most` things that may be taken for one of the scene's, and are none: only kinds
+    that it does not have, so its sentence stays true of it."""
+    present = {item.asset for item in scene.everything}
+    alike = sorted(taken_kinds(scene) - present - FURNITURE)
+    looks = [(asset, range(variant_count(asset))) for asset in alike]
+    kinds = [ClutterKind(asset, [{"look": n} for n in numbers]) for asset, numbers in looks]
+    found = clutter(scene, rng, most, kinds)
+    return tuple(replace(item, name=f"look_alike_{n}") for n, item in enumerate(found))
 
 
 def _on_table(scene: Scene, x: Array, y: Array, model: ObjectModel) -> Mask:

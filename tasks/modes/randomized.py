@@ -16,7 +16,8 @@ import numpy as np
 
 from robospa.registry import did_you_mean
 from robospa.tasks.modes import Part, with_table_raised
-from robospa.tasks.modes.clutter import clutter
+from robospa.tasks.modes.clutter import clutter, look_alikes
+from robospa.tasks.modes.wording import other_target
 from robospa.tasks.scene import SEEN, TEXTURES, UNSEEN, WHITE, Lights, Scene, Texture
 from robospa.tasks.shapes import Color
 
@@ -31,7 +32,9 @@ class Variation:
 
     `draw(scene, part, strength, textures)` makes the varied scene. One with `whole` strengths
     counts things. One that is not `official` is left out unless it is named. A `tangible` one
-    changes where bodies are.
+    changes where bodies are. `profile` are the strengths at which a profile measures it, `of` the
+    group that it stands in there: words, eyes, hands, scene or, of "repeat", which changes nothing
+    but the policy's seed, none.
     """
 
     name: str
@@ -41,6 +44,13 @@ class Variation:
     whole: bool = False
     official: bool = True
     tangible: bool = False
+    profile: tuple[float, ...] = ()
+    of: str = "scene"
+
+    @property
+    def numbered(self) -> bool:
+        """Whether its strength always stands in the mode's name: of a table's several rows."""
+        return self.draw is _elsewhere and len(self.profile) > 1
 
 
 def _height(scene: Scene, part: Part, strength: float, textures: str) -> Scene:
@@ -91,20 +101,78 @@ def _white_table(scene: Scene, part: Part, strength: float, textures: str) -> Sc
     return replace(scene, surroundings=replace(scene.surroundings, table=Texture(WHITE, 0)))
 
 
+def _look_alikes(scene: Scene, part: Part, strength: float, textures: str) -> Scene:
+    more = look_alikes(scene, part("look-alikes"), int(strength))
+    return replace(scene, clutter=(*scene.clutter, *more))
+
+
+def _other_target(scene: Scene, part: Part, strength: float, textures: str) -> Scene:
+    return other_target(scene, part("other target"))
+
+
+def _elsewhere(scene: Scene, part: Part, strength: float, textures: str) -> Scene:
+    """What is changed is not in the scene: who speaks, draws or moves reads its strength."""
+    return scene
+
+
+def _axis(of: str, name: str, *profile: float, most: float, whole: bool = False) -> Variation:
+    """A part whose usual strength is the middle one of its profile."""
+    usual = profile[len(profile) // 2]
+    return Variation(name, usual, most, _elsewhere, whole, False, profile=profile, of=of)
+
+
+def _words(name: str, draw: Callable[[Scene, Part, float, str], Scene] = _elsewhere) -> Variation:
+    return Variation(name, 1.0, 1.0, draw, True, False, profile=(1.0,), of="words")
+
+
+REPEAT = Variation("repeat", 1.0, 1.0, _elsewhere, True, False, profile=(1.0,), of="")
+
+
 VARIATIONS = {
     v.name: v
     for v in (
-        Variation("height", 0.03, 0.05, _height, tangible=True),
-        Variation("texture", 0.98, 1.0, _texture),
-        Variation("light", 1.0, 1.0, _light),
-        Variation("clutter", 10.0, 20.0, _clutter, whole=True, tangible=True),
-        Variation("camera", 0.02, 0.1, _camera, official=False),
+        Variation("height", 0.03, 0.05, _height, tangible=True, profile=(0.03,)),
+        Variation("texture", 0.98, 1.0, _texture, profile=(0.98,)),
+        Variation("light", 1.0, 1.0, _light, profile=(0.5, 1.0)),
+        Variation("clutter", 10.0, 20.0, _clutter, whole=True, tangible=True, profile=(5.0, 10.0)),
+        Variation("camera", 0.02, 0.1, _camera, official=False, profile=(0.02, 0.05)),
         Variation("white-table", 1.0, 1.0, _white_table, whole=True, official=False),
+        Variation("look-alikes", 2.0, 5.0, _look_alikes, True, False, True, profile=(2.0,)),
+        _axis("eyes", "blur", 1, 2, 4, most=10),
+        _axis("eyes", "noise", 10, 20, 40, most=100),
+        _axis("eyes", "jpeg", 80, 95, most=99, whole=True),
+        _axis("eyes", "bright", 1, 2, most=4),
+        _axis("eyes", "dark", 1, 2, most=4),
+        _axis("eyes", "grey", 1, most=1, whole=True),
+        _axis("eyes", "wrist-shift", 8, 16, most=80, whole=True),
+        _axis("eyes", "no-wrists", 1, most=1, whole=True),
+        _axis("hands", "start", 2, 5, most=20),
+        _axis("hands", "action-noise", 2, 5, 10, most=50),
+        _axis("hands", "action-bias", 5, 10, most=50),
+        _axis("hands", "latency", 100, 200, 400, most=10_000),
+        *map(_words, ("other-words", "other-order", "short", "long", "indirect", "lower-case")),
+        _axis("words", "typos", 1, 3, most=20, whole=True),
+        *map(_words, ("no-sentence", "nothing-here")),
+        _words("other-target", _other_target),
+        REPEAT,
     )
 }
 """By name, in the order in which they are applied: clutter stands on the table as it is then."""
 
 OFFICIAL = {v.name: v.usual for v in VARIATIONS.values() if v.official}
+
+
+def axes(text: str) -> list[tuple[str, float]]:
+    """The parts and strengths that a profile of `text` measures: parts with all the strengths of
+    their profile, or with one of their own ("blur=3"), groups of parts (words, eyes, hands, scene)
+    or "all", which leaves out what needs a real clock. ValueError for what is none of these."""
+    found: list[tuple[str, float]] = []
+    for word in (w.strip() for w in text.split(",")):
+        group = [v for v in VARIATIONS.values() if word in ("all", v.of) and v.name != "latency"]
+        group = [VARIATIONS[word]] if word in VARIATIONS else group
+        found += [(v.name, strength) for v in group for strength in v.profile or (v.usual,)]
+        found += [] if group else [_part(word, text)]
+    return list(dict.fromkeys(found))
 
 
 @dataclass(frozen=True)
@@ -137,7 +205,9 @@ class Randomized:
         if self.strengths == OFFICIAL:
             return ""
         return ",".join(
-            name if strength == VARIATIONS[name].usual else f"{name}={strength:g}"
+            name
+            if strength == VARIATIONS[name].usual and not VARIATIONS[name].numbered
+            else f"{name}={strength:g}"
             for name, strength in self.strengths.items()
         )
 

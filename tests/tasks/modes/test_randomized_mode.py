@@ -96,7 +96,7 @@ def test_every_part_has_a_stream_of_its_own() -> None:
         assert there.lights == (full if name == "light" else none).lights
         assert (there.camera_shift != none.camera_shift) == (name == "camera")
         assert scene.table_rise == (whole.table_rise if name == "height" else 0.0)
-        assert bool(scene.clutter) == (name == "clutter")
+        assert bool(scene.clutter) == (name in ("clutter", "look-alikes"))
         assert scene.strengths == {name: VARIATIONS[name].usual}
     assert whole.surroundings.camera_shift == (0.0, 0.0, 0.0)
     assert whole.strengths == OFFICIAL
