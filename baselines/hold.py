@@ -28,8 +28,3 @@ class Hold:
         """The present command, float32 (CHUNK, D)."""
         state = np.asarray(observation["state"], dtype=np.float32)
         return np.tile(state, (CHUNK, 1))
-
-
-def create() -> Hold:
-    """A new policy, one per connection."""
-    return Hold()

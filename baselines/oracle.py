@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from robospa.harness.demonstrations.changed_plans import KINDS, ChangedExpert, occasions, wrong_plan
 from robospa.harness.robots import embodiment
+from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.skills import Expert
 from robospa.observation import Observation
 from robospa.protocol.policy import PolicySpec, TrialInfo
@@ -60,16 +61,20 @@ class Oracle:
 
     def infer(self, observation: Observation) -> NDArray[np.float32]:
         """The next skill's actions, float32 (T, D)."""
+        expert, snapshot, _ = self._acting(observation)
+        return expert.next(snapshot)
+
+    def _acting(self, observation: Observation) -> tuple[Expert, Snapshot, Embodiment]:
+        """Who acts in this trial, made at its first observation; what it sees now; the robot."""
         if self._scene is None:
             raise RuntimeError("the policy was asked for actions before a reset")
-        snapshot = snapshot_from_json(
-            observation["privileged"], embodiment(self._scene.embodiment).grippers
-        )
+        robot = embodiment(self._scene.embodiment)
+        snapshot = snapshot_from_json(observation["privileged"], robot.grippers)
         if self._expert is None:
             told = observation["privileged"].get("scene")  # by a world whose scenes have no key
             scene = self._scene if told is None else Scene.from_json(told)
             self._expert = self._planned(scene, snapshot)
-        return self._expert.next(snapshot)
+        return self._expert, snapshot, robot
 
     def _planned(self, scene: Scene, snapshot: Snapshot) -> Expert:
         """Who acts in this trial."""
@@ -99,7 +104,7 @@ class FailingOracle(Oracle):
     ALL takes another in every trial, by its policy seed, of those that the scene has occasion for.
     """
 
-    def __init__(self, kind: str) -> None:
+    def __init__(self, kind: str = "neighbour") -> None:
         super().__init__()
         if kind not in (*KINDS, ALL):
             raise ValueError(f"no mistake {kind!r}; there are {', '.join(KINDS)}, {ALL}")
@@ -125,8 +130,3 @@ class FailingOracle(Oracle):
         except ValueError:
             plan, self.applies = (), False
         return ChangedExpert(scene, snapshot, plan)
-
-
-def create_failing(kind: str = "neighbour") -> FailingOracle:
-    """A new policy that makes the mistake `kind`, one per connection."""
-    return FailingOracle(kind)

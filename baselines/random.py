@@ -43,8 +43,3 @@ class Random:
         walk = state + np.cumsum(strides, axis=0)
         walk[:, self._grippers] = generator.uniform(0.0, 1.0, (CHUNK, 2))
         return walk.astype(np.float32)
-
-
-def create() -> Random:
-    """A new policy, one per connection."""
-    return Random()

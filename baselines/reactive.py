@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 from robospa.action_space import quantize
 from robospa.baselines.oracle import Oracle
 from robospa.harness.clock.policy_clock import action_steps, rate_of
-from robospa.harness.robots import embodiment
 from robospa.observation import Observation
 from robospa.protocol.policy import TrialInfo
-from robospa.tasks.snapshot import Snapshot, snapshot_from_json
+from robospa.tasks.snapshot import Snapshot
 
 Actions = NDArray[np.float32]
 
@@ -62,12 +61,7 @@ class Reactive(Oracle):
 
     def infer(self, observation: Observation) -> Actions:
         """The next actions, float32 (T, D)."""
-        if self._scene is None:
-            raise RuntimeError("the policy was asked for actions before a reset")
-        robot = embodiment(self._scene.embodiment)
-        snapshot = snapshot_from_json(observation["privileged"], robot.grippers)
-        if self._expert is None:
-            self._expert = self._planned(self._scene, snapshot)
+        _, snapshot, robot = self._acting(observation)
         commanded = np.asarray(observation["state"], np.float32)
         if self._last is None:
             self._last = commanded

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 from frame import Figure, Result, main
 
-from robospa.baselines.oracle import create_failing
+from robospa.baselines.oracle import FailingOracle
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import TrialSetup, run_trial, task_parts
 from robospa.results.failures.labels import NAMES, label
@@ -57,7 +57,7 @@ def parts(key: TrialKey) -> TrialSetup:
 
 def found_label(world: SapienWorld, kind: str, key: TrialKey) -> str | None:
     """The label of one scripted trial; "" if the script did not come off, None without occasion."""
-    policy = create_failing(kind)
+    policy = FailingOracle(kind)
     record = run_trial(world, policy, key, policy_seed=0, parts=parts)
     if not policy.applies:
         return None

@@ -108,3 +108,12 @@ def recording_console(columns: int) -> Console:
         force_jupyter=False,
         color_system="truecolor",
     )
+
+
+def size_text(size: float) -> str:
+    """`1.2 GB`, `35 MB`."""
+    for unit in ("bytes", "kB", "MB", "GB"):
+        if size < 1000:
+            return f"{size:.3g} {unit}"
+        size /= 1000
+    return f"{size:.3g} TB"

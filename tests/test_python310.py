@@ -70,7 +70,7 @@ def test_it_imports_on_python_310_where_there_is_one() -> None:
         "from robospa.protocol.client import connect\n"
         "from robospa.protocol.policy import TrialInfo\n"
         "import numpy as np\n"
-        "with ServerThread(policy_factory=hold.create) as server, connect(server.url) as policy:\n"
+        "with ServerThread(policy_factory=hold.Hold) as server, connect(server.url) as policy:\n"
         "    policy.reset(TrialInfo('t', 'aloha-agilex', 'x'))\n"
         "    seen = {'step': 0, 'instruction': 'x', 'images': {}}\n"
         "    print(policy.infer({**seen, 'state': np.zeros(14, np.float32)}).shape)\n"

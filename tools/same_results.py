@@ -93,7 +93,7 @@ def __getattr__(name: str) -> Callable[[], object]:
 
     from robospa.baselines import oracle
 
-    return lambda: oracle.create_failing(kind=name)
+    return lambda: oracle.FailingOracle(kind=name)
 
 
 def write_scenes(folder: Path) -> None:

@@ -17,9 +17,10 @@ import csv
 import json
 import math
 from collections import defaultdict
-from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Sequence
+from concurrent.futures import as_completed
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from statistics import fmean
 
@@ -28,6 +29,7 @@ from numpy.typing import NDArray
 
 from robospa.baselines.oracle import Oracle
 from robospa.geometry import Vec3
+from robospa.harness.pool import JobProcess, Pool
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import run_trial
 from robospa.harness.world import TABLE, SceneUnstable
@@ -215,31 +217,24 @@ class Shown:
         )
 
 
-WORLD: list[PlainWorld] = []
+def runner(_: None) -> Callable[[TrialKey], dict[str, object]]:
+    """`run` in a process of its own, which keeps its world."""
+    return partial(run, PlainWorld())
 
 
-def solvable(key: TrialKey) -> bool:
-    """Whether the expert solves the trial, as it does those of accepted seeds."""
-    return run_trial(WORLD[0], Oracle(), key, policy_seed=0).success
-
-
-def run(name: str, level: int, seed: int) -> dict[str, object]:
+def run(world: PlainWorld, key: TrialKey) -> dict[str, object]:
     """One trial as a row; a seed whose scene is not stable is told as such."""
-    if not WORLD:
-        WORLD.append(PlainWorld())
-    policy = PlanInCalls(WORLD[0])
-    row: dict[str, object] = {"task": name, "level": level, "seed": seed}
+    policy = PlanInCalls(world)
+    row: dict[str, object] = {"task": key.task, "level": key.level, "seed": key.seed}
     try:
-        record: TrialRecord = run_trial(
-            WORLD[0], policy, TrialKey(name, level, seed), policy_seed=0
-        )
+        record: TrialRecord = run_trial(world, policy, key, policy_seed=0)
     except (SceneUnstable, ValueError) as error:
         return {**row, "end": f"unstable: {error}"}
     calls = record.diagnostics.get("calls", [])
     wrong = [(one["skill"], one["feedback"]) for one in calls if one["feedback"] != "done"]
     end = record.end
-    if end != "success" and not solvable(TrialKey(name, level, seed)):
-        end = "expert fails, too"
+    if end != "success" and not run_trial(world, Oracle(), key, policy_seed=0).success:
+        end = "expert fails, too"  # so no list of accepted seeds would have it
     return {
         **row,
         "end": end,
@@ -285,15 +280,18 @@ def main() -> None:
     rows = [json.loads(line) for line in text.splitlines()]
     there = {(row["task"], row["level"], row["seed"]) for row in rows}
     asked = [
-        (one.name, level, FIRST_SEED + n)
+        TrialKey(one.name, level, FIRST_SEED + n)
         for n in range(given.seeds)
         for one in tasks().values()
         for level in one.levels
         if not given.tasks or one.name in given.tasks.split(",")
     ]
-    left = [key for key in asked if key not in there]
-    with ProcessPoolExecutor(given.workers) as pool, given.out.open("a") as out:
-        for job in as_completed([pool.submit(run, *key) for key in left]):
+    left = [key for key in asked if (key.task, key.level, key.seed) not in there]
+    from skill_ceiling import runner  # by the name that its process finds it by
+
+    start = partial(JobProcess, runner, None, name="ceiling")
+    with Pool(start, given.workers) as pool, given.out.open("a") as out:
+        for job in as_completed([pool.submit(key) for key in left]):
             rows.append(job.result())
             print(json.dumps(rows[-1]), file=out, flush=True)
     lines = table(rows)

@@ -18,7 +18,6 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import ModuleType
-from typing import NamedTuple
 
 import msgspec
 
@@ -31,6 +30,8 @@ REFUSED = (400, 413, 422)
 """Statuses with which an endpoint refuses what it was sent."""
 FIRST_PAUSE, LONGEST_PAUSE = 0.5, 20.0
 """[s] between two requests to an endpoint that is away and does not say for how long."""
+UNREADABLE = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError)
+"""What reading a page raises that is no completion."""
 LONGEST_ANSWER = 50_000
 """Characters of an answer that are looked at."""
 
@@ -87,13 +88,6 @@ class EndpointOptions:
         return (tokens_in * self.price_in + tokens_out * self.price_out) / 1e6
 
 
-class ChatAnswer(NamedTuple):
-    """What the model said: `text`, and the arguments of its tool calls as JSON texts."""
-
-    text: str
-    tools: tuple[str, ...]
-
-
 @dataclass
 class ChatEndpoint:
     """An endpoint that several threads may ask; one that is away is left alone by all of them."""
@@ -143,9 +137,10 @@ class ChatEndpoint:
                 f"{self.options.endpoint} has no model {self.options.model!r}; it has {some}"
             )
 
-    def ask(self, body: Mapping[str, object], until: float, used: Usage) -> ChatAnswer:
-        """The answer to a request, and in `used` (all 0) what it cost. Raises BadAnswer; Away at
-        `until`, on the monotonic clock, if there is none."""
+    def ask(self, body: Mapping[str, object], until: float, used: Usage) -> list[str]:
+        """The answer to a request, the JSON texts of its tool calls or else its text, and in `used`
+        (all 0) what it cost. Raises BadAnswer; Away at `until`, on the monotonic clock, if there is
+        none."""
         pause = FIRST_PAUSE
         while True:
             self._wait(until)
@@ -169,7 +164,7 @@ class ChatEndpoint:
             if time.monotonic() >= until:
                 raise Away(f"{self._why}; it may be asked again in {self._free - now:.0f} s")
 
-    def _once(self, body: Mapping[str, object], until: float, used: Usage) -> ChatAnswer:
+    def _once(self, body: Mapping[str, object], until: float, used: Usage) -> list[str]:
         given, began = self.options, time.monotonic()
         more = {"model": given.model, given.limit: given.max_tokens, "extra_body": self._extra}
         try:
@@ -208,8 +203,8 @@ class ChatEndpoint:
         text = said["content"] if isinstance(said.get("content"), str) else ""
         if not text.strip() and not tools:
             raise BadAnswer("the model answered nothing")
-        texts = [one if isinstance(one, str) else json.dumps(one) for one in tools]
-        return ChatAnswer(text[:LONGEST_ANSWER], tuple(one[:LONGEST_ANSWER] for one in texts))
+        texts = [one if isinstance(one, str) else json.dumps(one) for one in tools or (text,)]
+        return [one[:LONGEST_ANSWER] for one in texts]
 
     def _said(self, error: Exception) -> str:
         """The error in one line that says where, without the key."""

@@ -20,7 +20,6 @@ from pathlib import Path
 
 from robospa.baselines.agent.endpoint import (
     BadAnswer,
-    ChatAnswer,
     ChatEndpoint,
     EndpointError,
     EndpointOptions,
@@ -200,7 +199,7 @@ class Agent:
         parts = question(trial, made, given)
         try:
             answer = self._endpoint.ask(request(parts, given), until, used)
-            said = " ".join(answer.tools) or answer.text
+            said = " ".join(answer)
             return read_answer(answer, self.spec)
         except BadAnswer as error:
             wrong = str(error)
@@ -304,9 +303,9 @@ def request(parts: Sequence[Message], options: AgentOptions) -> Message:
     return {"messages": [system, user], **(TOOLS if tools else {})}
 
 
-def read_answer(answer: ChatAnswer, spec: PolicySpec) -> tuple[str, list[dict[str, object]]]:
-    """Note and calls in tool calls or, where there are none, in the text; raises BadAnswer."""
-    found = [_last_json(text) for text in answer.tools or (answer.text,)]
+def read_answer(texts: Sequence[str], spec: PolicySpec) -> tuple[str, list[dict[str, object]]]:
+    """Note and calls in the texts of an answer; raises BadAnswer."""
+    found = [_last_json(text) for text in texts]
     calls: list[object] = []
     for one in found:
         if not isinstance(inner := one.get("calls"), list):
@@ -362,8 +361,3 @@ class Agents:
     def __call__(self) -> Agent:
         """An agent of its own for a connection."""
         return Agent(self._options, self._endpoint, self._totals)
-
-
-def create(options: AgentOptions) -> Agents:
-    """The agents of a server; raises EndpointError."""
-    return Agents(options)

@@ -271,6 +271,7 @@ class Learners:
     """Makes a policy for each connection; all share the networks."""
 
     def __init__(self, options: LearnedOptions) -> None:
+        """Raises FileNotFoundError for a folder without weights."""
         folder = Path(options.path).expanduser() if options.path else WEIGHTS
         if not folder.is_dir() or not any(folder.iterdir()):
             raise FileNotFoundError(f"{folder} has no weights: robospa learn {folder} makes some")
@@ -298,8 +299,3 @@ class Learners:
     def __call__(self) -> Learned:
         """A policy for one connection."""
         return self._kind(self.spec, self._look, self._decide)
-
-
-def create(options: LearnedOptions) -> Learners:
-    """The learned reference. Raises FileNotFoundError for a folder without weights."""
-    return Learners(options)

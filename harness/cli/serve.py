@@ -124,12 +124,11 @@ def options_class(make: Callable[..., object]) -> type[Any] | None:
     the function takes plain texts."""
     import dataclasses
     import inspect
-    import typing
 
-    names = list(inspect.signature(make).parameters)
-    if len(names) != 1:
+    if len(inspect.signature(make).parameters) != 1:
         return None
-    found = typing.get_type_hints(make).get(names[0])
+    (only,) = inspect.signature(make, eval_str=True).parameters.values()
+    found = only.annotation
     return found if isinstance(found, type) and dataclasses.is_dataclass(found) else None
 
 

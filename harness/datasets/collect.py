@@ -33,7 +33,6 @@ from robospa.harness.datasets.settings import (
     expected_bytes,
     frames_of,
     lists_of,
-    size_text,
     trial_of,
     versions,
 )
@@ -46,7 +45,7 @@ from robospa.harness.settings import Compute, SettingsError, changed
 from robospa.registry import did_you_mean
 from robospa.results.records.runs import LOCK
 from robospa.tasks.seeds import FIRST_TRAINING_SEED, ListKey
-from robospa.text import clock_text
+from robospa.text import clock_text, size_text
 from robospa.trial import path_part
 
 EPISODES, SETTINGS = "episodes", "settings.json"

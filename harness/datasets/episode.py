@@ -235,14 +235,11 @@ def episode_bytes(episode: DatasetEpisode) -> bytes:
     return stream.getvalue()
 
 
-def read_episode_file(path: Path, pictures: bool = True) -> DatasetEpisode:
-    """The episode in `path`, without its `pictures` if they are not wanted.
-
-    Raises EpisodeFileError, in one sentence, for whatever cannot be read.
-    """
+def read_episode_file(path: Path) -> DatasetEpisode:
+    """The episode in `path`; EpisodeFileError, in one sentence, for whatever cannot be read."""
     try:
         with zipfile.ZipFile(path) as file:
-            return _read(file, pictures)
+            return _read(file)
     except EpisodeFileError as error:
         raise EpisodeFileError(f"{path} {error}") from error
     except FileNotFoundError as error:
@@ -255,7 +252,7 @@ def read_episode_file(path: Path, pictures: bool = True) -> DatasetEpisode:
         raise EpisodeFileError(f"{path} cannot be read as an episode: {error}") from error
 
 
-def _read(file: zipfile.ZipFile, pictures: bool) -> DatasetEpisode:
+def _read(file: zipfile.ZipFile) -> DatasetEpisode:
     data = parse_json(file.read(HEADER).decode())
     version = data.get("format") if isinstance(data, dict) else None
     if version != FORMAT:
@@ -266,7 +263,7 @@ def _read(file: zipfile.ZipFile, pictures: bool) -> DatasetEpisode:
     header = read(_Header, data, HEADER, EpisodeFileError)
     same = {name: getattr(header, name) for name in SAME}
     same |= {name: _array(file, name, dtype) for name, dtype in ARRAYS.items()}
-    found = _pictures(file, header.cameras) if pictures else {}
+    found = _pictures(file, header.cameras)
     return DatasetEpisode(**same, pictures=found, about=header.about)
 
 

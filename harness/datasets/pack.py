@@ -113,10 +113,7 @@ def check_packages(layout: str) -> None:
 
 
 def pack(
-    layout: str,
-    folder: Path,
-    files: Sequence[Path],
-    manifest: DatasetManifest,
+    layout: str, folder: Path, files: Sequence[Path], manifest: DatasetManifest
 ) -> DatasetRecord:
     """Write the episodes in `files`, in their order, to `folder` in a format of `FORMATS`.
 
@@ -178,12 +175,7 @@ def pack_episodes(
     return made
 
 
-def _write(
-    writer: Writer,
-    folder: Path,
-    episodes: Iterable[Source],
-    facts: CardFacts,
-) -> None:
+def _write(writer: Writer, folder: Path, episodes: Iterable[Source], facts: CardFacts) -> None:
     lines = EpisodeLines(folder)
     try:
         for index, (name, episode) in enumerate(episodes):

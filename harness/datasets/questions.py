@@ -14,11 +14,9 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from functools import cache
+from functools import partial
 from itertools import count, islice
-from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -30,11 +28,11 @@ from robospa.harness.datasets.settings import (
     Collection,
     command_of,
     lists_of,
-    size_text,
     trial_of,
     versions,
 )
 from robospa.harness.pointing import asked_for, box_of, point_on
+from robospa.harness.pool import JobProcess, Pool
 from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.selection import parse_modes
 from robospa.harness.settings import SettingsError
@@ -45,7 +43,7 @@ from robospa.tasks.catalog import task as find_task
 from robospa.tasks.modes import for_training
 from robospa.tasks.sampling.places import LayoutError
 from robospa.tasks.seeds import FIRST_SEED, FIRST_TRAINING_SEED, ListKey
-from robospa.text import markdown_table
+from robospa.text import markdown_table, size_text
 from robospa.trial import TrialKey
 
 if TYPE_CHECKING:
@@ -118,9 +116,10 @@ def collect_questions(
     """
     files = list(_files(settings, out))
     pending = [file for file in files if not file.done]
-    with ProcessPoolExecutor(min(workers, len(pending)) or 1, get_context("spawn")) as pool:
-        for file, size in zip(pending, pool.map(make_file, pending), strict=True):
-            say(f"{file.path.name}: {size_text(size)}")
+    start = partial(JobProcess, file_maker, None, name="questions")
+    with Pool[QuestionFile, int](start, min(workers, len(pending))) as pool:
+        for job, file in [(pool.submit(file), file) for file in pending]:
+            say(f"{file.path.name}: {size_text(job.result())}")
     counts = [need("pyarrow.parquet").read_metadata(file.path).num_rows for file in files]
     replace_file(out / "README.md", _card(settings, files, counts).encode())
     return sum(counts)
@@ -149,21 +148,28 @@ def _command(settings: Collection) -> str:
     return command_of(settings, "").replace("--format ''", "--questions")
 
 
-def make_file(file: QuestionFile) -> int:
+def file_maker(_: None) -> Callable[[QuestionFile], int]:
+    """`make_file` in a process of its own, which keeps its world."""
+    from robospa.harness.sim.sapien_world import SapienWorld
+
+    return partial(make_file, SapienWorld(render=True))
+
+
+def make_file(world: SapienWorld, file: QuestionFile) -> int:
     """Make it; its bytes."""
     pa, pq = need("pyarrow", "demos"), need("pyarrow.parquet", "demos")
     stream, columns = io.BytesIO(), schema(file.made_by)
     with pq.ParquetWriter(stream, columns, compression="zstd") as writer:
         for key in file.keys:
-            rows = list(islice(_questions(key, file.split), file.wanted))
+            rows = list(islice(_questions(world, key, file.split), file.wanted))
             writer.write_table(pa.Table.from_pylist(rows, columns))
     replace_file(file.path, stream.getvalue())
     return stream.tell()
 
 
-def _questions(key: ListKey, split: str) -> Iterator[Row]:
+def _questions(world: SapienWorld, key: ListKey, split: str) -> Iterator[Row]:
     """The questions of a variant, of one seed after the other that comes to rest."""
-    world, camera = _world(), CameraSpec("head")
+    camera = CameraSpec("head")
     for seed in count(FIRST_TRAINING_SEED if split == "train" else FIRST_SEED):
         trial = trial_of(key, seed)
         trial = trial if split == "train" else replace(trial, split="heldout")
@@ -207,13 +213,6 @@ def _png(picture: NDArray[np.uint8] | Mask) -> dict[str, object]:
     stream = io.BytesIO()
     image.fromarray(picture).save(stream, "PNG")
     return {"bytes": stream.getvalue(), "path": None}
-
-
-@cache
-def _world() -> SapienWorld:
-    from robospa.harness.sim.sapien_world import SapienWorld
-
-    return SapienWorld(render=True)
 
 
 def _card(settings: Collection, files: Sequence[QuestionFile], counts: Sequence[int]) -> str:

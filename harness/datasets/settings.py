@@ -29,6 +29,7 @@ from robospa.tasks.catalog import task
 from robospa.tasks.modes import for_training
 from robospa.tasks.scene import SUITE
 from robospa.tasks.seeds import ListKey
+from robospa.text import size_text
 from robospa.trial import REFERENCE, TrialKey
 
 Share = Annotated[float, Meta(ge=0, le=1)]
@@ -187,12 +188,3 @@ def check_room(folder: Path, wanted: float) -> str:
             "room, choose another --out, fewer episodes or cameras, or images that are smaller"
         )
     return f"about {size_text(wanted)}, twice that while it is packed; {size_text(free)} are free"
-
-
-def size_text(size: float) -> str:
-    """`1.2 GB`, `35 MB`."""
-    for unit in ("bytes", "kB", "MB", "GB"):
-        if size < 1000:
-            return f"{size:.3g} {unit}"
-        size /= 1000
-    return f"{size:.3g} TB"

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from robospa.results.records.manifest import RunError
 from robospa.results.records.runs import LOCK
+from robospa.text import size_text
 
 PARTIAL = ".*.part"
 """What a file is called while it is being written."""
@@ -66,12 +67,7 @@ def _free(folder: Path) -> str:
         found = os.statvfs(folder)
     except OSError:
         return "nothing known to be"
-    size = float(found.f_bavail * found.f_frsize)
-    for unit in ("bytes", "KB", "MB", "GB"):
-        if size < 1000 or unit == "GB":
-            break
-        size /= 1000
-    return f"{size:.3g} {unit}"
+    return size_text(found.f_bavail * found.f_frsize)
 
 
 def sync_folder(folder: Path) -> None:

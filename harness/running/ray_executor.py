@@ -230,13 +230,10 @@ class RayExecutor(Executor):
         self._counted = time.monotonic()
         self._addresses = {node["NodeID"]: node["NodeManagerAddress"] for node in alive}
         self._slots = {
-            node["NodeID"]: self._fitting(node["Resources"])
+            node["NodeID"]: fitting(node["Resources"], self._needs)
             for node in alive
             if node["NodeID"] not in self._left_out
         }
-
-    def _fitting(self, resources: Mapping[str, float]) -> int:
-        return fitting(resources, self._needs)
 
     def _leave_out(self, node: str, reason: str) -> None:
         if node not in self._left_out:

@@ -197,10 +197,8 @@ def write_actions(
     """Keep the executed actions, float32 (steps, D), so that the trial can be replayed; of pose
     actions also the joint actions (steps, D') that were executed in their place."""
     buffer = io.BytesIO()
-    if joints is None:
-        np.savez_compressed(buffer, actions=actions, space=np.array(space))
-    else:
-        np.savez_compressed(buffer, actions=actions, space=np.array(space), joints=joints)
+    arrays: dict[str, Any] = {"actions": actions, "space": np.array(space)}
+    np.savez_compressed(buffer, **(arrays if joints is None else {**arrays, "joints": joints}))
     replace_file(action_path(folder, key), buffer.getvalue(), parents=False)
 
 

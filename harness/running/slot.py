@@ -44,9 +44,7 @@ class Slot:
 
     def due(self) -> float:
         """When it has to have advanced; infinite while it has nothing to do."""
-        if self.ready and self.job is None:
-            return float("inf")
-        if not self.sent:
+        if not self.sent or (self.ready and self.job is None):
             return float("inf")
         return self.deadline if self.monitor is None else min(self.deadline, self.monitor.deadline)
 

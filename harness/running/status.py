@@ -180,11 +180,9 @@ def server_text(server: ServerStats, now: float) -> str:
 
 
 def _ms(value: float) -> str:
-    return f"{value:.1f} ms" if value < 10 else f"{value:.0f} ms" if value < 1e4 else _s(value)
-
-
-def _s(value: float) -> str:
-    return f"{value / 1000:.0f} s"
+    if value >= 1e4:
+        return f"{value / 1000:.0f} s"
+    return f"{value:.1f} ms" if value < 10 else f"{value:.0f} ms"
 
 
 SMOOTHING = 0.3  # weight of the newest trial in the running means

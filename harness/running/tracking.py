@@ -7,7 +7,7 @@ costs no trial.
 import secrets
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from robospa.extras import need
 from robospa.harness.running.atomic_file import replace_file
@@ -19,8 +19,8 @@ ID_FILE = "wandb.txt"
 """In a run's folder: the id under which W&B knows it, so that a resumed run goes on there."""
 
 
-class RunTracker(Protocol):
-    """What is told of a run while it goes on."""
+class RunTracker:
+    """What is told of a run while it goes on; this one tells nobody."""
 
     def add(self, record: TrialRecord) -> None:
         """A trial has its record."""
@@ -32,20 +32,7 @@ class RunTracker(Protocol):
         """Nothing else comes, whether the run has ended or was stopped."""
 
 
-class NoTracker:
-    """Tells nobody."""
-
-    def add(self, record: TrialRecord) -> None:
-        """Forget it."""
-
-    def finish(self, run: Run) -> None:
-        """Forget it."""
-
-    def close(self) -> None:
-        """Nothing is open."""
-
-
-class WandbTracker:
+class WandbTracker(RunTracker):
     """A run at Weights & Biases: its settings, the rates as they come, and its trials as a table.
 
     Where it goes, and with whose key, is what the variables of W&B say (WANDB_MODE, WANDB_API_KEY).
@@ -134,7 +121,7 @@ class CarefulTracker:
 def open_tracker(log: str, folder: Path, settings: Mapping[str, Any]) -> RunTracker:
     """The tracker that the setting `log` names; raises MissingPackage without its package."""
     name, _, project = log.partition(":")
-    return NoTracker() if name == "none" else WandbTracker(folder, project or PROJECT, settings)
+    return RunTracker() if name == "none" else WandbTracker(folder, project or PROJECT, settings)
 
 
 def _identity(folder: Path) -> str:

@@ -15,7 +15,7 @@ from scripted_endpoint import AWAY, BAD, ScriptedEndpoint, Shown, by_colour
 import robospa
 from robospa.baselines.agent import endpoint as module
 from robospa.baselines.agent.endpoint import Away, EndpointError
-from robospa.baselines.agent.policy import Agent, AgentOptions, create
+from robospa.baselines.agent.policy import Agent, AgentOptions, Agents
 from robospa.protocol.client import connect
 from robospa.protocol.errors import PolicyAnswerError, PolicyError
 from robospa.protocol.policy import USAGE, TrialInfo
@@ -45,7 +45,7 @@ def scripted() -> Iterator[ScriptedEndpoint]:
 
 def agent(endpoint: ScriptedEndpoint, **given: Any) -> Agent:
     options = AgentOptions(endpoint=endpoint.url, model="scripted", width=16, height=12)
-    made = create(replace(options, **given))()
+    made = Agents(replace(options, **given))()
     made.reset(TRIAL)
     return made
 
@@ -130,7 +130,7 @@ def test_a_trial_that_has_used_up_what_it_may_use_is_done(
 
 
 def test_what_lost_attempts_have_used_is_in_the_next_one(scripted: ScriptedEndpoint) -> None:
-    agents = create(AgentOptions(endpoint=scripted.url, model="scripted"))
+    agents = Agents(AgentOptions(endpoint=scripted.url, model="scripted"))
     for attempt in (1, 2):
         one = agents()
         one.reset(TRIAL)
@@ -146,7 +146,7 @@ def test_the_key_is_in_no_error_and_no_greeting(
 ) -> None:
     monkeypatch.setenv("SECRET", KEY)
     options = AgentOptions(endpoint=scripted.url, model="scripted", key="SECRET", log=tmp_path)
-    agents = create(replace(options, deadline=0.5, width=16, height=12))
+    agents = Agents(replace(options, deadline=0.5, width=16, height=12))
     scripted.key = f"{KEY}?"
     with ServerThread(policy_factory=agents) as server, connect(server.url) as remote:
         assert KEY not in repr(remote.hello)
@@ -176,7 +176,7 @@ def test_what_cannot_work_is_said_at_the_start(
     scripted: ScriptedEndpoint, given: dict[str, Any], words: str
 ) -> None:
     with pytest.raises(EndpointError, match=words):
-        create(replace(AgentOptions(endpoint=scripted.url, model="scripted"), **given))
+        Agents(replace(AgentOptions(endpoint=scripted.url, model="scripted"), **given))
 
 
 def test_of_200_trials_with_bad_answers_none_is_lost_or_scored_wrongly() -> None:
@@ -186,7 +186,7 @@ def test_of_200_trials_with_bad_answers_none_is_lost_or_scored_wrongly() -> None
     sums = dict.fromkeys(USAGE, 0.0)
     with ScriptedEndpoint(model, AWAY + BAD, 0.2, seed=90) as scripted:
         options = AgentOptions(endpoint=scripted.url, model="scripted", width=16, height=12)
-        made = create(replace(options, price_in=3.0, price_out=15.0))
+        made = Agents(replace(options, price_in=3.0, price_out=15.0))
         with ServerThread(policy_factory=made) as server, connect(server.url) as remote:
             for number in range(200):
                 trial = replace(TRIAL, id=str(number), instruction=f"trial {number}")
@@ -221,7 +221,7 @@ def test_a_model_that_goes_by_pixels_solves_trials_whatever_its_endpoint_does(
     tmp_path: Path,
 ) -> None:
     with ScriptedEndpoint(by_colour, AWAY + BAD, 0.3, seed=2) as scripted:
-        made = create(AgentOptions(endpoint=scripted.url, model="scripted", price_out=15.0))
+        made = Agents(AgentOptions(endpoint=scripted.url, model="scripted", price_out=15.0))
         with ServerThread(policy_factory=made) as server:
             run = robospa.evaluate(
                 server.url, tasks="Basic_Color_Blocks", levels=1, trials=6, workers=1, out=tmp_path

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from robot_at_home import at_home
 
 from robospa.baselines import blind, hold, random, replay
-from robospa.baselines.oracle import create_failing
+from robospa.baselines.oracle import FailingOracle
 from robospa.baselines.reactive import FASTEST, SNAP, create, line
 from robospa.geometry import Pose
 from robospa.harness.running.record_store import write_actions
@@ -139,13 +139,13 @@ def seen(step: int = 0) -> dict[str, Any]:
 
 
 def test_hold_sends_the_state_back() -> None:
-    chunk = hold.create().infer(seen())
+    chunk = hold.Hold().infer(seen())
     assert chunk.dtype == np.float32
     assert (chunk == STATE).all()
 
 
 def test_random_depends_on_the_policy_seed_and_the_step_only() -> None:
-    policy, other = random.create(), random.create()
+    policy, other = random.Random(), random.Random()
     policy.reset(TRIAL)
     policy.infer(seen(10))
     other.reset(TRIAL)
@@ -220,7 +220,7 @@ SEED = 930_000
 
 def test_an_unknown_mistake_is_refused_at_once() -> None:
     with pytest.raises(ValueError, match="no mistake 'sulks'; there are neighbour"):
-        create_failing("sulks")
+        FailingOracle("sulks")
 
 
 @pytest.mark.sim
@@ -241,7 +241,7 @@ def test_a_scripted_mistake_is_labelled_as_scripted(kind: str, name: str, expect
     from robospa.harness.sim.sapien_world import SapienWorld
     from robospa.harness.trial import run_trial
 
-    world, policy = SapienWorld(render=False), create_failing(kind)
+    world, policy = SapienWorld(render=False), FailingOracle(kind)
     found = label(run_trial(world, policy, TrialKey(name, 2, SEED), policy_seed=0))
     world.close()
     assert policy.applies and found is not None
@@ -255,7 +255,7 @@ def test_one_that_makes_all_mistakes_makes_another_in_every_trial() -> None:
 
     world, policy, key = (
         SapienWorld(render=False),
-        create_failing("all"),
+        FailingOracle("all"),
         TrialKey("Pick_Blocks_Size", 2, 930_000),
     )
     found = [label(run_trial(world, policy, key, policy_seed=seed)) for seed in range(3)]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from robospa.baselines.learned.act import Belief, possible, told
-from robospa.baselines.learned.policy import Learned, LearnedCalls, LearnedOptions, create
+from robospa.baselines.learned.policy import Learned, LearnedCalls, LearnedOptions, Learners
 from robospa.baselines.learned.steps import Seen, State, Step, Tracked, labelled
 from robospa.harness.robots import embodiment
 from robospa.harness.sim.sapien_world import SapienWorld
@@ -152,4 +152,4 @@ def test_what_is_hidden_below_the_table_cannot_be_acted_on() -> None:
 
 def test_a_folder_without_weights_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
-        create(LearnedOptions(str(tmp_path)))
+        Learners(LearnedOptions(str(tmp_path)))

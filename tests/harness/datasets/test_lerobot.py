@@ -333,7 +333,6 @@ def test_reading_gives_back_every_bit(tmp_path: Path, stills: bool) -> None:
     path = tmp_path / "1000007.zip"
     path.write_bytes(episode_bytes(episode))
     assert_equal(read_episode_file(path), episode)
-    assert_equal(read_episode_file(path, pictures=False), replace(episode, pictures={}))
 
 
 def test_equal_episodes_have_equal_bytes_and_execute_the_next_command() -> None:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robospa.baselines.random import create
+from robospa.baselines.random import Random
 from robospa.harness.pictures.video import FilmRecorder, film
 from robospa.harness.running.record_store import ActionRecorder, write_actions
 from robospa.harness.sim.sapien_world import SapienWorld
@@ -42,7 +42,7 @@ def test_the_pictures_are_those_of_the_trial(
     seen: list[Any] = []
     monkeypatch.setattr(FilmRecorder, "add", lambda self, image: seen.append(image.copy()))
     world, both = SapienWorld(render=True), Both()
-    record = run_trial(world, create(), KEY, policy_seed=3, recorder=both, step_scale=0.02)
+    record = run_trial(world, Random(), KEY, policy_seed=3, recorder=both, step_scale=0.02)
     write_actions(tmp_path, KEY, both.actions, "joint")
     during, seen[:] = list(seen), []
     film(world, record, tmp_path, step_scale=0.02)

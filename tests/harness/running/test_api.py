@@ -108,8 +108,8 @@ def test_what_cannot_be_is_refused_before_anything_is_written(
 
 @pytest.mark.sim
 def test_a_policy_of_this_process_in_the_real_world(tmp_path: Path) -> None:
-    from robospa.baselines.hold import create
+    from robospa.baselines.hold import Hold
 
-    run = robospa.evaluate(create, tasks="Pick_Blocks_Size", levels=1, trials=1, out=tmp_path)
+    run = robospa.evaluate(Hold, tasks="Pick_Blocks_Size", levels=1, trials=1, out=tmp_path)
     (record,) = run.records.values()
     assert record.end == "step_limit" and record.physics_steps > 0
