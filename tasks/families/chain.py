@@ -9,12 +9,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from robospa.action_space import ARMS
-from robospa.geometry import Vec3
-from robospa.tasks.families.table import Item, frame_of, named, side, side_of
+from robospa.tasks.families.table import Item, frame_of, presses, sample, side, side_of
 from robospa.tasks.goals.checklist import CHAIN, Checklist, Subtask, by_turns
 from robospa.tasks.goals.conditions import Condition
-from robospa.tasks.goals.counters import PRESS_BOX, PressCounter
 from robospa.tasks.instructions import Slots, Templates
 from robospa.tasks.plan import Pick, Place, Press, Skill
 from robospa.tasks.sampling.places import NoRoom, Point, Range, retry
@@ -95,8 +92,7 @@ class ActionChain:
         items = retry(
             lambda: self.items(level, rng, workcell), f"objects of {self.name} level {level}"
         )
-        scene_objects, names = named(rng, items)
-        return SceneSample(scene_objects, self.facts(**names), self.table_shift)
+        return sample(rng, items, self.facts, self.table_shift)
 
     def goal(self, scene: Scene) -> Checklist:
         steps = self.steps[scene.level]
@@ -120,27 +116,15 @@ class ActionChain:
         return (*skills, *self.end)
 
 
-def button(
-    scene: Scene, name: str, box: Vec3 = PRESS_BOX, own_side_closed: bool = False
-) -> PressCounter:
-    """Counts presses of an object, at its official contact point.
-
-    With `own_side_closed` the gripper on the object's side must be closed.
-    """
-    arm = ARMS.index(side_of(scene, name)) if own_side_closed else None
-    return PressCounter(name, frame_of(scene, name, "touched"), box, arm)
-
-
 def pressing_arm(scene: Scene, name: str) -> str:
     """The arm on the side of an object's press point."""
     pose = scene.object(name).pose
     return side(pose.apply(frame_of(scene, name, "press").position)[0])
 
 
-def click(scene: Scene, name: str, box: Vec3 = PRESS_BOX) -> Station:
+def click(scene: Scene, name: str) -> Station:
     """A click of the closed gripper on the object's side."""
-    press = Press(name, arm=side_of(scene, name))
-    return Station(button(scene, name, box, own_side_closed=True), (press,))
+    return Station(presses(scene, name, closed=True), (Press(name, arm=side_of(scene, name)),))
 
 
 def there(place: Place, condition: Condition) -> Station:

@@ -143,7 +143,6 @@ ON_TRAY, TRAY_HEIGHT = 0.08, 0.02
 """Largest level offset [m] from the middle of the half, and height [m] above the tray's floor."""
 HOME, HOME_HEIGHT = 0.04, 0.005
 """Largest offset [m] from the place at the start, in the plane and in height."""
-CLICK_BOX = (0.025, 0.025, 0.03)
 
 
 @dataclass(frozen=True)
@@ -196,7 +195,7 @@ def _tray_station(scene: Scene, step: str) -> Station:
     """Food on the tray (latched once it has to go back), a click, food at home again."""
     facts, steps = TrayFacts.of(scene), TRAY_STEPS[scene.level]
     if step == "c":
-        return chain.click(scene, facts.bell, CLICK_BOX)
+        return chain.click(scene, facts.bell)
     role = FOOD[step.lower()][0]
     name, half = {"burger": facts.burger, "fries": facts.fries}[role], HALF[role]
     spot = table.frame_of(scene, facts.tray, half)

@@ -16,9 +16,8 @@ from robospa.geometry import Pose
 from robospa.tasks import objects
 from robospa.tasks.colors import NAMED
 from robospa.tasks.families import table
-from robospa.tasks.families.chain import ActionChain, Station, button
+from robospa.tasks.families.chain import ActionChain, Station, click
 from robospa.tasks.goals.conditions import Opened, Rests, level_with
-from robospa.tasks.goals.counters import PressCounter
 from robospa.tasks.instructions import Slots, TaskText
 from robospa.tasks.plan import Home, Open, Pick, Place, Press
 from robospa.tasks.sampling.places import NoRoom, Point, Range, free_point, tried_point
@@ -30,8 +29,6 @@ from robospa.workcell import Workcell
 CAN_TEXT = TaskText.beside(__file__, "chain_clicks_can.toml")
 TEXT = TaskText.beside(__file__, "chain_clicks_microwave.toml")
 
-CAN_BOX, BELL_BOX = (0.03, 0.03, 0.04), (0.025, 0.025, 0.03)
-"""Half sizes [m] of the box around the press point in which a touch counts."""
 CAN_X, CAN_FIRST_Y, CAN_Y = (-0.25, -0.05), (-0.2, -0.15), (-0.2, 0.1)
 BASKET = (0.10, -0.2)
 BREAD_X, BREAD_Y, BREAD_YAW = (0.15, 0.27), (-0.10, 0.05), math.pi / 4
@@ -87,7 +84,7 @@ def _can_items(level: int, rng: np.random.Generator, workcell: Workcell) -> list
 def _can_station(scene: Scene, step: str) -> Station:
     facts, top = CanFacts.of(scene), scene.table_top
     if step == "c":
-        return Station(button(scene, facts.can, CAN_BOX), (Press(facts.can, arm="left"),))
+        return Station(table.presses(scene, facts.can), (Press(facts.can, arm="left"),))
     if step == "b":
         name, basket = facts.bread, facts.basket
         rim = top + objects.model_of(scene.object(basket)).size[2]
@@ -231,9 +228,7 @@ def beside(pose: Pose, other: Pose) -> bool:
 def _station(scene: Scene, step: str) -> Station:
     facts = MicrowaveFacts.of(scene)
     if step == "c":
-        press = table.frame_of(scene, facts.bell, "touched")
-        counter = PressCounter(facts.bell, press, BELL_BOX, arm=0)
-        return Station(counter, (Press(facts.bell, arm="left"),))
+        return click(scene, facts.bell)
     if step == "o":
         opened = Opened(facts.microwave, OPEN * _door({}).upper)
         return Station(opened, (Open(facts.microwave, arm="left"),))

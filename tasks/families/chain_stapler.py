@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.geometry import Pose
-from robospa.tasks.families.chain import ActionChain, Region, Station, button, placed, pressing_arm
+from robospa.tasks.families.chain import ActionChain, Region, Station, placed, pressing_arm
 from robospa.tasks.families.dustbin import BIN, TABLE_SHIFT, container
-from robospa.tasks.families.table import Item, draw_variant, frame_of, radius, thing
+from robospa.tasks.families.table import Item, draw_variant, frame_of, presses, radius, thing
 from robospa.tasks.goals.conditions import Inside, Near, Rests
 from robospa.tasks.goals.counters import StampCounter, inside_box
 from robospa.tasks.instructions import Slots, TaskText, times
@@ -99,7 +99,7 @@ def _phone_station(scene: Scene, step: str) -> Station:
         rests = Rests(phone, near, targets=(stand,))
         return Station(rests, (Dock(phone, on=stand, arm="right"),))
     if step == "s":
-        return Station(button(scene, facts.stapler), (Press(facts.stapler, arm="right"),))
+        return Station(presses(scene, facts.stapler), (Press(facts.stapler, arm="right"),))
     small, dustbin = facts.table_trash_bin, facts.dustbin
     inside = Inside(facts.garbage, container(scene.object(dustbin)), targets=(dustbin,))
     return Station(inside, (Home("right"), Pour(small, into=dustbin, arm="left")), tool=small)
@@ -179,7 +179,7 @@ def _seals_station(scene: Scene, step: str) -> Station:
     facts = SealsFacts.of(scene)
     if step == "s":
         press = Press(facts.stapler, arm=pressing_arm(scene, facts.stapler))
-        return Station(button(scene, facts.stapler), (press,))
+        return Station(presses(scene, facts.stapler), (press,))
     left = step == "l"
     seal, pad = (facts.left_seal, facts.left_pad) if left else (facts.right_seal, facts.right_pad)
     stamp = Stamp(seal, on=pad, times=SEALS_STEPS[scene.level].count(step), arm=SIDES[step])

@@ -11,13 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robospa.action_space import ARMS
-from robospa.geometry import Vec3
 from robospa.tasks import objects
 from robospa.tasks.families import table
 from robospa.tasks.families.table import standing
 from robospa.tasks.goals.clicks import ClickInOrder
-from robospa.tasks.goals.counters import PRESS_BOX, PressCounter
 from robospa.tasks.instructions import NUMBERS, Slots, TaskText, acting_arm, one_after_another
 from robospa.tasks.plan import Press, Skill
 from robospa.tasks.sampling import places
@@ -32,8 +29,6 @@ BELLS_TEXT = TaskText.beside(__file__, "click_order_bells.toml")
 
 TRIES = 60
 """Candidate places per object and draw."""
-BOXES: Mapping[str, Vec3] = {"can": (0.03, 0.03, 0.04), "bell": (0.025, 0.025, 0.03)}
-"""Half sizes [m] of the box around the press point in which a touch counts, where not usual."""
 VARIANTS: Mapping[str, tuple[int, ...]] = {
     "alarm_clock": (0, 1), "bread": (0, 1, 2, 4, 5), "bell": (0, 1),
 }  # fmt: skip
@@ -88,13 +83,6 @@ def laid_out(
     return [placed[i] for i in range(len(items))]
 
 
-def click_counter(scene: Scene, name: str, closed: bool = True) -> PressCounter:
-    """Counts clicks of an object; `closed`: only while the gripper on its side is closed."""
-    arm = ARMS.index(table.side_of(scene, name)) if closed else None
-    box = BOXES.get(scene.object(name).asset, PRESS_BOX)
-    return PressCounter(name, table.frame_of(scene, name, "touched"), box, arm=arm)
-
-
 def clicks(scene: Scene, order: Sequence[str]) -> tuple[Skill, ...]:
     """A press each, by the arm on the object's side."""
     return tuple(Press(name, arm=table.side_of(scene, name)) for name in order)
@@ -102,7 +90,9 @@ def clicks(scene: Scene, order: Sequence[str]) -> tuple[Skill, ...]:
 
 def in_order(scene: Scene, order: Sequence[str], standing: bool) -> ClickInOrder:
     """The goal of clicks in `order`; see ClickInOrder for `standing`."""
-    return ClickInOrder([click_counter(scene, name) for name in order], standing=standing)
+    return ClickInOrder(
+        [table.presses(scene, name, closed=True) for name in order], standing=standing
+    )
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
@@ -117,10 +107,10 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSampl
     things = [(asset, clickable(rng, asset)) for asset in ORDER[:level]]
     places = laid_out(rng, workcell, AREA, MIDDLE, DISTANCE, things)
     items = [
-        table.Item(asset, asset, standing(*place), variant, fixed=True)
+        table.Item("order", asset, standing(*place), variant, fixed=True)
         for (asset, variant), place in zip(things, places, strict=True)
     ]
-    return table.sample(rng, items, lambda n: Facts(tuple(n[asset] for asset in ORDER[:level])))
+    return table.sample(rng, items, Facts)
 
 
 def slots(scene: Scene) -> Slots:
@@ -162,11 +152,8 @@ def _draw_bells(level: int, rng: np.random.Generator, workcell: Workcell) -> Sce
     """The ring of bells, all of one variant, shifted to a random place of the region."""
     params = clickable(rng, "bell")
     points = _ring(level, rng, table.in_view(workcell, "bell", params))
-    items = [
-        table.thing(f"bell {i}", "bell", point, params, fixed=True)
-        for i, point in enumerate(points)
-    ]
-    return table.sample(rng, items, lambda n: Facts(tuple(n[item.role] for item in items)))
+    items = [table.thing("order", "bell", point, params, fixed=True) for point in points]
+    return table.sample(rng, items, Facts)
 
 
 def _ring(

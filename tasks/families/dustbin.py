@@ -6,7 +6,7 @@ left arm takes it.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -91,17 +91,15 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSampl
     count = objects.variant_count("bottle")
     variants = rng.choice(count, size=level, replace=level > min(3, count))
     items = [table.Item("dustbin", "dustbin", BIN, {"look": 0}, fixed=True)]
-    for i, (point, variant) in enumerate(zip(points, variants, strict=True)):
-        items.append(table.thing(f"bottle {i}", "bottle", point, {"look": int(variant)}))
-    scene_objects, names = table.named(rng, items)
-    facts = Facts(names["dustbin"], tuple(names[f"bottle {i}"] for i in range(level)))
-    return SceneSample(scene_objects, facts, TABLE_SHIFT)
+    for point, variant in zip(points, variants, strict=True):
+        items.append(table.thing("bottles", "bottle", point, {"look": int(variant)}))
+    return table.sample(rng, items, Facts, TABLE_SHIFT)
 
 
 def goal(scene: Scene) -> Tracker:
-    dustbin = scene.object(Facts.of(scene).dustbin)
-    names = Facts.of(scene).bottles
-    return collect(names, container(dustbin), lost_below=scene.table_top - 0.1)
+    facts = Facts.of(scene)
+    inside = container(scene.object(facts.dustbin))
+    return collect(facts.bottles, inside, lost_below=scene.table_top - 0.1)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
@@ -116,11 +114,9 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
         right = point[0] > 0
         return right, math.dist(point, EXCHANGE if right else BIN.position[:2])
 
-    dustbin = Facts.of(scene).dustbin
-    skills: list[Skill] = []
-    for name in sorted(Facts.of(scene).bottles, key=turn):
-        skills += discard(scene, name, dustbin)
-    return tuple(skills)
+    facts = Facts.of(scene)
+    order = sorted(facts.bottles, key=turn)
+    return tuple(skill for name in order for skill in discard(scene, name, facts.dustbin))
 
 
 def _bottle_slots(count: int) -> Slots:
@@ -236,12 +232,11 @@ def _station(scene: Scene, step: str) -> chain.Station:
     )
 
 
-def _exchange_place(taken: Iterable[tuple[Point, float]]) -> Point:
+def _exchange_place(taken: Sequence[tuple[Point, float]]) -> Point:
     """The place nearest to EXCHANGE that keeps its distance [m] from each point of `taken`.
 
     Where there is none, the one with most room.
     """
-    taken = tuple(taken)
 
     def rating(point: Point) -> tuple[float, float, Point]:
         room = min((_distance(point, other) - far for other, far in taken), default=0.0)

@@ -70,7 +70,7 @@ def wall(y: float, half_x: float = WALL_HALF[0]) -> table.Item:
 def stand(y: float, half: tuple[float, float, float]) -> table.Item:
     """A flat gray stand over the table at `y` [m]: white is seen on it, and black."""
     params = {"half": list(half), "color": list(NAMED["gray"])}
-    return table.Item("stand", "block", Pose((0.0, y, STAND_Z)), params, fixed=True)
+    return table.Item("", "block", Pose((0.0, y, STAND_Z)), params, fixed=True)
 
 
 def noun_of(item: SceneObject) -> str:
@@ -126,17 +126,11 @@ def _draw_blocks(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
     items = [wall(0.12), BLOCKS_STAND]
     for color, x in zip(colors[:level], row(level, SHOWN_X), strict=True):
         at, rgb = (x, BLOCKS_STAND.pose.position[1]), table.COLORS[color]
-        items.append(table.block(f"{color} shown", at, HALF, rgb, fixed=True, top=STAND_TOP))
-    for color, point in zip(colors, points, strict=True):
-        items.append(table.block(color, point, HALF, table.COLORS[color]))
-    scene_objects, names = table.named(rng, items)
-    facts = WallFacts(
-        colors=tuple(colors[:level]),
-        targets=tuple(names[color] for color in colors[:level]),
-        others=tuple(names[color] for color in colors[level:]),
-        wall=names[WALL],
-    )
-    return SceneSample(scene_objects, facts)
+        items.append(table.block("", at, HALF, rgb, fixed=True, top=STAND_TOP))
+    for i, (color, point) in enumerate(zip(colors, points, strict=True)):
+        role = "targets" if i < level else "others"
+        items.append(table.block(role, point, HALF, table.COLORS[color]))
+    return table.sample(rng, items, WallFacts, colors=tuple(colors[:level]))
 
 
 def _blocks_goal(scene: Scene) -> AfterCue:
@@ -200,11 +194,9 @@ def _draw_objects(level: int, rng: np.random.Generator, workcell: Workcell) -> S
     for (kind, variant), x, place in zip(things, row(level, SHOWN_X), places, strict=True):
         turn = rng.uniform(-SHOWN_TURN, SHOWN_TURN) if kind == "bread" else 0.0
         pose = Pose((x, OBJECTS_STAND.pose.position[1], STAND_TOP), yaw_rotation(turn))
-        items.append(table.Item(f"{kind} shown", kind, pose, variant, fixed=True))
-        items.append(table.Item(kind, kind, table.standing(*place), variant, fixed=True))
-    scene_objects, names = table.named(rng, items)
-    facts = ObjectsFacts(tuple(names[kind] for kind in kinds), tuple(kinds), names[WALL])
-    return SceneSample(scene_objects, facts)
+        items.append(table.Item("", kind, pose, variant, fixed=True))
+        items.append(table.Item("order", kind, table.standing(*place), variant, fixed=True))
+    return table.sample(rng, items, ObjectsFacts, kinds=tuple(kinds))
 
 
 def _objects_goal(scene: Scene) -> AfterCue:
@@ -265,21 +257,14 @@ def _draw_turned(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
     far_kind = int(rng.integers(2))
     variant = int(rng.integers(objects.variant_count("t_block")))
     items = [wall(0.10)]
-    for i, (x, turn) in enumerate(zip(row(level, FAR_X), shown, strict=True)):
-        look = {"look": variant, "kind": far_kind}
-        items.append(table.thing(f"far {i}", "t_block", (x, FAR_Y), look, TURNS[turn]))
-    for i, (x, turn) in enumerate(zip(row(level, NEAR_X), start, strict=True)):
-        look = {"look": variant, "kind": 1 - far_kind}
-        items.append(table.thing(f"near {i}", "t_block", (x, NEAR_Y), look, TURNS[turn]))
-    scene_objects, names = table.named(rng, items)
-    facts = TurnedFacts(
-        near=tuple(names[f"near {i}"] for i in range(level)),
-        far=tuple(names[f"far {i}"] for i in range(level)),
-        turns=tuple(shown),
-        start=tuple(start),
-        wall=names[WALL],
-    )
-    return SceneSample(scene_objects, facts)
+    for role, most, y, kind, turns in (
+        ("far", FAR_X, FAR_Y, far_kind, shown),
+        ("near", NEAR_X, NEAR_Y, 1 - far_kind, start),
+    ):
+        look = {"look": variant, "kind": kind}
+        for x, turn in zip(row(level, most), turns, strict=True):
+            items.append(table.thing(role, "t_block", (x, y), look, TURNS[turn]))
+    return table.sample(rng, items, TurnedFacts, turns=tuple(shown), start=tuple(start))
 
 
 def _turned_goal(scene: Scene) -> AfterCue:
@@ -357,27 +342,23 @@ class CountsFacts(SceneFacts):
 def _draw_counts(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     y = rng.uniform(*STAPLERS_Y)
     items = []
-    for i, x in enumerate(STAPLER_ROWS[level]):
+    for x in STAPLER_ROWS[level]:
         turn, look = rng.uniform(-math.pi, math.pi), table.draw_variant(rng, "stapler")
-        items.append(table.thing(f"stapler {i}", "stapler", (x, y), look, turn, fixed=True))
+        items.append(table.thing("row", "stapler", (x, y), look, turn, fixed=True))
     counts = tuple(int(n) for n in rng.integers(1, MOST + 1, level))
-    roles = [item.role for item in items]
-    return table.sample(rng, items, lambda n: CountsFacts(tuple(n[r] for r in roles), counts))
+    return table.sample(rng, items, CountsFacts, counts=counts)
 
 
 def _counts_goal(scene: Scene) -> PressCounts:
     """The row from left to right with its counts; grippers need not be closed (official)."""
-    row = [
-        click_order.click_counter(scene, name, closed=False) for name in CountsFacts.of(scene).row
-    ]
-    return PressCounts(row, CountsFacts.of(scene).counts)
+    facts = CountsFacts.of(scene)
+    return PressCounts([table.presses(scene, name) for name in facts.row], facts.counts)
 
 
 def _counts_plan(scene: Scene) -> tuple[Skill, ...]:
-    skills: list[Skill] = []
-    for name, count in zip(CountsFacts.of(scene).row, CountsFacts.of(scene).counts, strict=True):
-        skills += [Press(name, arm=pressing_arm(scene, name))] * count
-    return tuple(skills)
+    facts = CountsFacts.of(scene)
+    names = (name for name, n in zip(facts.row, facts.counts, strict=True) for _ in range(n))
+    return tuple(Press(name, arm=pressing_arm(scene, name)) for name in names)
 
 
 def _counts_slots(scene: Scene) -> Slots:
@@ -446,29 +427,21 @@ class CoverFacts(SceneFacts):
 
 def _draw_cover(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     chosen = shuffled(rng, list(COVER_COLORS))[:level]
+    order = tuple(shuffled(rng, chosen))
     items = []
     for color, x in zip(chosen, COVER_ROWS[level], strict=True):
-        at = (x, COVER_Y)
-        block = table.block(f"{color} block", at, COVER_HALF, COVER_COLORS[color], fixed=True)
-        cover = table.Item(f"{color} cover", "cover", table.standing(at), appears_at=HIDDEN_AT)
-        items += [block, cover]
-    order = tuple(shuffled(rng, chosen))
-    scene_objects, names = table.named(rng, items)
-    facts = CoverFacts(
-        colors=order,
-        covers=tuple(names[f"{color} cover"] for color in order),
-        blocks=tuple(names[f"{color} block"] for color in order),
-    )
-    return SceneSample(scene_objects, facts)
+        at, turn, rgb = (x, COVER_Y), order.index(color), COVER_COLORS[color]
+        items.append(table.block(f"blocks {turn}", at, COVER_HALF, rgb, fixed=True))
+        pose = table.standing(at)
+        items.append(table.Item(f"covers {turn}", "cover", pose, appears_at=HIDDEN_AT))
+    return table.sample(rng, items, CoverFacts, colors=order)
 
 
 def _open_places(scene: Scene) -> dict[str, Point]:
     """Where each cover goes, in the asked order."""
-    facts, places = CoverFacts.of(scene), {}
-    for cover, block in zip(facts.covers, facts.blocks, strict=True):
-        x, y, _ = scene.object(block).pose.position
-        places[cover] = (x, y + BEHIND)
-    return places
+    facts = CoverFacts.of(scene)
+    at = (scene.object(block).pose.position for block in facts.blocks)
+    return {cover: (x, y + BEHIND) for cover, (x, y, _) in zip(facts.covers, at, strict=True)}
 
 
 def _cover_goal(scene: Scene) -> AfterCue:

@@ -97,20 +97,14 @@ def _draw_blocks(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
     first, second = (list(COLORS)[int(i)] for i in rng.permutation(len(COLORS))[:2])
     right = TO_RIGHT[level] if level > 1 else int(rng.integers(2))
     words = [first] * right + [second] * (level - right)
+    roles = ["right"] * right + ["left"] * (level - right)
     half = rng.uniform(*HALF)
     items = [
-        table.block(str(i), (square.x, square.y), half, COLORS[word], square.yaw)
-        for i, (word, square) in enumerate(zip(words, _squares(rng, level, half), strict=True))
+        table.block(role, (square.x, square.y), half, COLORS[word], square.yaw)
+        for role, word, square in zip(roles, words, _squares(rng, level, half), strict=True)
     ]
-    scene_objects, names = table.named(rng, items)
-    blocks = tuple(names[str(i)] for i in range(level))
-    facts = BlocksFacts(
-        right=blocks[:right],
-        left=blocks[right:],
-        right_color=first if right else None,
-        left_color=second if right < level else None,
-    )
-    return SceneSample(scene_objects, facts)
+    ours, theirs = first if right else None, second if right < level else None
+    return table.sample(rng, items, BlocksFacts, right_color=ours, left_color=theirs)
 
 
 def _blocks_goal(scene: Scene) -> Tracker:
@@ -186,10 +180,10 @@ def _draw_cards(level: int, rng: np.random.Generator, workcell: Workcell) -> Sce
     variants = [table.draw_variant(rng, "playing_cards") for _ in points]
     lying = [Turnable("playing_cards", *thing) for thing in zip(variants, points, strict=True)]
     items = [
-        table.thing(str(i), box.asset, box.place, box.params, yaw)
-        for i, (box, yaw) in enumerate(zip(lying, free_turns(rng, workcell, lying), strict=True))
+        table.thing("boxes", box.asset, box.place, box.params, yaw)
+        for box, yaw in zip(lying, free_turns(rng, workcell, lying), strict=True)
     ]
-    return table.sample(rng, items, lambda n: CardsFacts(tuple(n[item.role] for item in items)))
+    return table.sample(rng, items, CardsFacts)
 
 
 def _cards_goal(scene: Scene) -> Tracker:
@@ -287,14 +281,14 @@ def _draw_food(level: int, rng: np.random.Generator, workcell: Workcell) -> Scen
     items = []
     centres, spread = SLOTS_X[level]
     for centre, index in zip(centres, rng.permutation(level), strict=True):
-        kind = kinds[0] if int(index) < first else kinds[1]
+        ahead = int(index) < first
+        kind, role = (kinds[0], "forward") if ahead else (kinds[1], "backward")
         variant = table.draw_variant(rng, ASSETS[kind])
         yaw = rng.uniform(-BREAD_YAW, BREAD_YAW) if kind == "bread" else 0.0
         x = MIDDLE + centre + rng.uniform(-spread, spread)
-        items.append(table.thing(str(int(index)), ASSETS[kind], (x, y), variant, yaw))
-    scene_objects, names = table.named(rng, items)
-    foods = tuple(names[str(i)] for i in range(level))
-    return SceneSample(scene_objects, FoodFacts(foods[:first], foods[first:], kinds[0], kinds[1]))
+        items.append(table.thing(f"{role} {index}", ASSETS[kind], (x, y), variant, yaw))
+    forward, backward = kinds
+    return table.sample(rng, items, FoodFacts, forward_kind=forward, backward_kind=backward)
 
 
 def _food_goal(scene: Scene) -> Tracker:

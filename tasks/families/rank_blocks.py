@@ -122,12 +122,10 @@ def _places(
 
 def _draw(looks: Sequence[Block], rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     items = [
-        table.block(str(rank), point, half, color, rng.uniform(-YAW, YAW))
-        for rank, ((half, color), point) in enumerate(
-            zip(looks, _places(looks, rng, workcell), strict=True)
-        )
+        table.block("order", point, half, color, rng.uniform(-YAW, YAW))
+        for (half, color), point in zip(looks, _places(looks, rng, workcell), strict=True)
     ]
-    return table.sample(rng, items, lambda n: Facts(tuple(n[item.role] for item in items)))
+    return table.sample(rng, items, Facts)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:

@@ -12,17 +12,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robospa.geometry import Vec3
 from robospa.tasks import objects
 from robospa.tasks.families import table
-from robospa.tasks.families.chain import button, pressing_arm
+from robospa.tasks.families.chain import pressing_arm
 from robospa.tasks.goals import counters
 from robospa.tasks.goals.checklist import Checklist
 from robospa.tasks.instructions import NUMBERS, Slots, TaskText, acting_arm, by_count
 from robospa.tasks.plan import Press, RaiseLower, Skill
 from robospa.tasks.sampling.places import Range
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
+from robospa.tasks.task import Level, SceneFacts, Task
 from robospa.workcell import Workcell
 
 STAPLER_TEXT = TaskText.beside(__file__, "repeat_stapler.toml")
@@ -32,20 +31,41 @@ LIFT_TEXT = TaskText.beside(__file__, "repeat_lift.toml")
 LEVELS = {n: Level(candidates=1, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
-def presses(
-    scene: Scene,
+def _task(
     name: str,
-    times: int,
-    box: Vec3 = counters.PRESS_BOX,
-    own_side_closed: bool = False,
-) -> Checklist:
-    """The goal of so many presses; subtask i is press i + 1, latched.
+    facts: type[SceneFacts],
+    thing: Callable[[np.random.Generator, Workcell], table.Item],
+    counter: Callable[[Scene, str], counters.ActionCounter],
+    expert: Callable[[Scene, str], tuple[Skill, ...]],
+    text: TaskText,
+    slots: Callable[[Scene], Slots],
+    summary: str,
+    success: str,
+    figures: Sequence[str] = counters.FIGURES,
+    radius: float = 0.12,
+) -> Task:
+    """The task to do what `counter` counts with the only `thing` as often as the level says.
 
-    Success latches at the last one asked for, so one press too many cannot happen, and it needs no
-    retreat (official).
+    Subtask i is count i + 1, latched. Success latches at the last one asked for, so one press too
+    many cannot happen, and it needs no retreat (official).
     """
-    presses = button(scene, name, box, own_side_closed)
-    return Checklist([presses] * times, figures=counters.FIGURES)
+
+    def goal(scene: Scene) -> Checklist:
+        counts = [counter(scene, scene.objects[0].name)] * scene.level
+        return Checklist(counts, radius=radius, figures=figures)
+
+    return Task(
+        name=name,
+        category="RPF",
+        levels=LEVELS,
+        draw=lambda level, rng, cell: table.sample(rng, [thing(rng, cell)], facts, count=level),
+        goal=goal,
+        plan=lambda scene: expert(scene, scene.objects[0].name),
+        templates=text.templates,
+        slots=slots,
+        summary=summary,
+        success=success,
+    )
 
 
 def _words(text: TaskText, count: int, own: Sequence[str], many: str) -> Slots:
@@ -65,42 +85,26 @@ class StaplerFacts(SceneFacts):
     count: int
 
 
-def _draw_stapler(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
+def _stapler(rng: np.random.Generator, workcell: Workcell) -> table.Item:
     point, turn = (rng.uniform(*X), rng.uniform(*Y)), rng.uniform(-math.pi, math.pi)
     look = table.draw_variant(rng, "stapler")
-    items = [table.thing("stapler", "stapler", point, look, turn, fixed=True)]
-    return table.sample(rng, items, lambda n: StaplerFacts(n["stapler"], level))
+    return table.thing("stapler", "stapler", point, look, turn, fixed=True)
 
 
-def _stapler_goal(scene: Scene) -> Checklist:
-    facts = StaplerFacts.of(scene)
-    return presses(scene, facts.stapler, facts.count)
-
-
-def _stapler_plan(scene: Scene) -> tuple[Skill, ...]:
-    facts = StaplerFacts.of(scene)
-    return (Press(facts.stapler, arm=pressing_arm(scene, facts.stapler)),) * facts.count
-
-
-PRESS_STAPLER = Task(
-    name="Press_Stapler_Repeat",
-    category="RPF",
-    levels=LEVELS,
-    draw=_draw_stapler,
-    goal=_stapler_goal,
-    plan=_stapler_plan,
-    templates=STAPLER_TEXT.templates,
-    slots=lambda s: _words(STAPLER_TEXT, StaplerFacts.of(s).count, ["stapler"], "presses"),
-    summary="Press the stapler the given number of times.",
-    success=(
-        "The stapler was touched by a gripper near its press point as often as asked, "
-        "with at least 0.1 s without a touch between presses."
-    ),
+PRESS_STAPLER = _task(
+    "Press_Stapler_Repeat",
+    StaplerFacts,
+    _stapler,
+    table.presses,
+    lambda scene, name: (Press(name, arm=pressing_arm(scene, name)),) * scene.level,
+    STAPLER_TEXT,
+    lambda scene: _words(STAPLER_TEXT, scene.level, ["stapler"], "presses"),
+    "Press the stapler the given number of times.",
+    "The stapler was touched by a gripper near its press point as often as asked, with at least "
+    "0.1 s without a touch between presses.",
 )
 
 BELL_FAR, BELL_Y, BELL_MIDDLE = 0.25, (-0.2, 0.0), 0.05
-BELL_BOX = (0.025, 0.025, 0.03)
-"""Half sizes [m] of the box around the bell's top in which a touch counts."""
 HOVER = 0.045
 """How far the expert rises between clicks [m]."""
 
@@ -113,7 +117,7 @@ class BellFacts(SceneFacts):
     count: int
 
 
-def _draw_bell(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
+def _bell(rng: np.random.Generator, workcell: Workcell) -> table.Item:
     """One bell in view and off the middle strip; left and right are equally likely."""
     variant = table.draw_variant(rng, "bell")
     model = objects.object_model("bell", variant)
@@ -123,40 +127,25 @@ def _draw_bell(level: int, rng: np.random.Generator, workcell: Workcell) -> Scen
         x = rng.uniform(max(-BELL_FAR, low), -BELL_MIDDLE)
     else:
         x = rng.uniform(BELL_MIDDLE, min(BELL_FAR, high))
-    items = [table.thing("bell", "bell", (x, y), variant, fixed=True)]
-    return table.sample(rng, items, lambda n: BellFacts(n["bell"], level))
-
-
-def _bell_goal(scene: Scene) -> Checklist:
-    facts = BellFacts.of(scene)
-    return presses(scene, facts.bell, facts.count, BELL_BOX, own_side_closed=True)
-
-
-def _bell_plan(scene: Scene) -> tuple[Skill, ...]:
-    facts = BellFacts.of(scene)
-    return (Press(facts.bell, hover=HOVER, arm=table.side_of(scene, facts.bell)),) * facts.count
+    return table.thing("bell", "bell", (x, y), variant, fixed=True)
 
 
 def _bell_slots(scene: Scene) -> Slots:
-    facts = BellFacts.of(scene)
-    words = _words(BELL_TEXT, facts.count, ["bell", "closed"], "clicks")
-    return words | acting_arm(table.side_of(scene, facts.bell))
+    words = _words(BELL_TEXT, scene.level, ["bell", "closed"], "clicks")
+    return words | acting_arm(table.side_of(scene, scene.objects[0].name))
 
 
-CLICK_BELL = Task(
-    name="Click_Bell_Repeat",
-    category="RPF",
-    levels=LEVELS,
-    draw=_draw_bell,
-    goal=_bell_goal,
-    plan=_bell_plan,
-    templates=BELL_TEXT.templates,
-    slots=_bell_slots,
-    summary="Click the bell the given number of times.",
-    success=(
-        "The bell was touched near its top, by a gripper and with the gripper on its side closed, "
-        "as often as asked, with at least 0.1 s without a touch between clicks."
-    ),
+CLICK_BELL = _task(
+    "Click_Bell_Repeat",
+    BellFacts,
+    _bell,
+    lambda scene, name: table.presses(scene, name, closed=True),
+    lambda scene, name: (Press(name, hover=HOVER, arm=table.side_of(scene, name)),) * scene.level,
+    BELL_TEXT,
+    _bell_slots,
+    "Click the bell the given number of times.",
+    "The bell was touched near its top, by a gripper and with the gripper on its side closed, as "
+    "often as asked, with at least 0.1 s without a touch between clicks.",
 )
 
 UP = 0.82
@@ -235,43 +224,33 @@ THINGS = (
 )
 
 
-def _draw_lifted(
-    thing: Lifted, level: int, rng: np.random.Generator, workcell: Workcell
-) -> SceneSample:
-    point, turn = (rng.uniform(*thing.x), rng.uniform(*thing.y)), rng.uniform(-thing.yaw, thing.yaw)
-    look = table.draw_variant(rng, thing.asset, thing.variants)
-    items = [table.thing("thing", thing.asset, point, look, turn)]
-    return table.sample(rng, items, lambda n: LiftFacts(n["thing"], level))
-
-
-def _lift_goal(thing: Lifted, scene: Scene) -> Checklist:
-    facts = LiftFacts.of(scene)
-    up, down = thing.tests(scene, facts.thing)
-    counter = counters.CycleCounter(facts.thing, up, down, THING_RADIUS)
-    return Checklist(
-        [counter] * facts.count, radius=THING_RADIUS, figures=("lifts", "released", "drops")
-    )
-
-
-def _lift_plan(thing: Lifted, scene: Scene) -> tuple[Skill, ...]:
-    facts = LiftFacts.of(scene)
-    arms = ("left", "right") if thing.both else (table.side_of(scene, facts.thing),)
-    return (RaiseLower(facts.thing, thing.rise, facts.count, arms),)
-
-
 def _lift_task(thing: Lifted) -> Task:
     own = [f"thing.{thing.name}", f"hands.{thing.name}"]
-    return Task(
-        name=f"Lift_{thing.name.capitalize()}_Repeat",
-        category="RPF",
-        levels=LEVELS,
-        draw=lambda level, rng, workcell: _draw_lifted(thing, level, rng, workcell),
-        goal=lambda scene: _lift_goal(thing, scene),
-        plan=lambda scene: _lift_plan(thing, scene),
-        templates=LIFT_TEXT.templates,
-        slots=lambda scene: _words(LIFT_TEXT, LiftFacts.of(scene).count, own, "lifts"),
-        summary=f"Lift the {thing.name} and put it back, the given number of times.",
-        success=thing.success,
+
+    def item(rng: np.random.Generator, workcell: Workcell) -> table.Item:
+        at, turn = (
+            (rng.uniform(*thing.x), rng.uniform(*thing.y)),
+            rng.uniform(-thing.yaw, thing.yaw),
+        )
+        look = table.draw_variant(rng, thing.asset, thing.variants)
+        return table.thing("thing", thing.asset, at, look, turn)
+
+    def expert(scene: Scene, name: str) -> tuple[Skill, ...]:
+        arms = ("left", "right") if thing.both else (table.side_of(scene, name),)
+        return (RaiseLower(name, thing.rise, scene.level, arms),)
+
+    return _task(
+        f"Lift_{thing.name.capitalize()}_Repeat",
+        LiftFacts,
+        item,
+        lambda scene, name: counters.CycleCounter(name, *thing.tests(scene, name), THING_RADIUS),
+        expert,
+        LIFT_TEXT,
+        lambda scene: _words(LIFT_TEXT, scene.level, own, "lifts"),
+        f"Lift the {thing.name} and put it back, the given number of times.",
+        thing.success,
+        ("lifts", "released", "drops"),
+        THING_RADIUS,
     )
 
 

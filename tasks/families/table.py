@@ -1,13 +1,16 @@
 """What tasks put on the table: items with neutral names, variants, colours, poses, and the view."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from operator import itemgetter
 
 import numpy as np
 
+from robospa.action_space import ARMS
 from robospa.geometry import Pose, Vec3, yaw_rotation
 from robospa.tasks import objects
 from robospa.tasks.colors import NAMED, stands_out
+from robospa.tasks.goals.counters import PRESS_BOX, PressCounter
 from robospa.tasks.goals.lifting import Lift, PickTracker
 from robospa.tasks.instructions import Phrasings
 from robospa.tasks.objects import model_of
@@ -55,7 +58,7 @@ def drawn_color(rng: np.random.Generator, low: float = 0.0, high: float = 1.0) -
 
 @dataclass(frozen=True)
 class Item:
-    """An object before it has a name; `role` is how the task's facts call it."""
+    """An object before it has a name; `role` is how the task's facts call it, "" if they do not."""
 
     role: str
     asset: str
@@ -80,30 +83,32 @@ def block(
     return Item(role, "block", Pose((*point, top + z), yaw_rotation(yaw)), params, fixed)
 
 
-def named(
-    rng: np.random.Generator, items: Sequence[Item]
-) -> tuple[tuple[SceneObject, ...], dict[str, str]]:
-    """`items` as scene objects "object_0".. in shuffled order, and the name of every role."""
-    order = [int(i) for i in rng.permutation(len(items))]
-    scene_objects, names = [], {}
-    for number, index in enumerate(order):
-        item, name = items[index], f"object_{number}"
-        names[item.role] = name
-        scene_objects.append(
-            SceneObject(name, item.asset, item.pose, item.params, item.fixed, item.appears_at)
-        )
-    return tuple(scene_objects), names
-
-
 def sample(
     rng: np.random.Generator,
     items: Sequence[Item],
-    facts: Callable[[dict[str, str]], SceneFacts],
+    facts: type[SceneFacts],
     shift: tuple[float, float] = (0.0, 0.0),
+    **more: object,
 ) -> SceneSample:
-    """The scene of `items`, named by chance, and its `facts`, made of the name of every role."""
-    scene_objects, names = named(rng, items)
-    return SceneSample(scene_objects, facts(names), shift)
+    """The scene of `items`, called "object_0".. in shuffled order, and its `facts`: a field has the
+    name of the item of that role; a tuple has those of several, and of roles "FIELD N" by N. `more`
+    are the other fields."""
+    order = [int(i) for i in rng.permutation(len(items))]
+    scene_objects = tuple(
+        SceneObject(f"object_{n}", item.asset, item.pose, item.params, item.fixed, item.appears_at)
+        for n, item in enumerate(items[i] for i in order)
+    )
+    found: dict[str, list[tuple[int, str]]] = {known.name: [] for known in fields(facts)}
+    for i, item in enumerate(items):
+        role, _, place = item.role.partition(" ")
+        found.setdefault(role, []).append((int(place or 0), f"object_{order.index(i)}"))
+    for known in fields(facts):
+        own = [name for _, name in sorted(found[known.name], key=itemgetter(0))]
+        if str(known.type).startswith("tuple"):
+            more.setdefault(known.name, tuple(own))
+        elif own:
+            more[known.name] = own[0]
+    return SceneSample(scene_objects, facts(**more), shift)
 
 
 def draw_variant(
@@ -167,6 +172,18 @@ def side_of(scene: Scene, name: str) -> str:
 def frame_of(scene: Scene, name: str, frame: str) -> Pose:
     """The named frame of an object, in the object's own frame."""
     return objects.model_of(scene.object(name)).frames[frame]
+
+
+BOXES: Mapping[str, Vec3] = {"can": (0.03, 0.03, 0.04), "bell": (0.025, 0.025, 0.03)}
+"""Half sizes [m] of the box around the press point in which a touch counts, where not usual."""
+
+
+def presses(scene: Scene, name: str, closed: bool = False) -> PressCounter:
+    """Counts presses of an object, at its official contact point; with `closed` only while the
+    gripper on its side is closed."""
+    arm = ARMS.index(side_of(scene, name)) if closed else None
+    box = BOXES.get(scene.object(name).asset, PRESS_BOX)
+    return PressCounter(name, frame_of(scene, name, "touched"), box, arm)
 
 
 def moved(name: str, to: Vec3, arm: str, lift: float = 0.08) -> tuple[Pick, Place]:

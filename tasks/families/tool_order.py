@@ -66,13 +66,10 @@ def _draw_hammer(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
     first, *others = places.scatter(rng, propose, DISTANCE)
     points = [first, *places.shuffled(rng, others)]
     items = [table.thing("hammer", "hammer", HAMMER_AT, table.draw_variant(rng, "hammer"))]
-    for (color, rgb), point in zip(table.ORDERED.items(), points, strict=False):
+    for rgb, point in zip(table.ORDERED.values(), points, strict=False):
         yaw = rng.uniform(-YAW, YAW)
-        items.append(table.block(color, point, HALF, rgb, yaw, fixed=True))
-    scene_objects, names = table.named(rng, items)
-    colors = tuple(table.ORDERED)[:level]
-    facts = HammerFacts(names["hammer"], colors, tuple(names[c] for c in colors))
-    return SceneSample(scene_objects, facts)
+        items.append(table.block("order", point, HALF, rgb, yaw, fixed=True))
+    return table.sample(rng, items, HammerFacts, colors=tuple(table.ORDERED)[:level])
 
 
 def _beside_hammer(x: Array, y: Array) -> places.Mask:
@@ -152,10 +149,8 @@ def _draw_seal(level: int, rng: np.random.Generator, workcell: Workcell) -> Scen
     points, seal = _layout(level, rng, workcell, variant)
     items = [table.thing("seal", "seal", seal, variant)]
     for color, point in zip(colors, points, strict=True):
-        items.append(table.thing(color, "pad", point, {"look": PADS.index(color)}, fixed=True))
-    scene_objects, names = table.named(rng, items)
-    facts = SealFacts(names["seal"], colors, tuple(names[c] for c in colors))
-    return SceneSample(scene_objects, facts)
+        items.append(table.thing("order", "pad", point, {"look": PADS.index(color)}, fixed=True))
+    return table.sample(rng, items, SealFacts, colors=colors)
 
 
 def _layout(

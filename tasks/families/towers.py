@@ -57,9 +57,7 @@ def _sample(
     colors: tuple[str, ...] = (),
 ) -> SceneSample:
     place = _building_place(level, rng, points)
-    scene_objects, names = table.named(rng, items)
-    order = tuple(names[item.role] for item in items)
-    return SceneSample(scene_objects, TowerFacts(order, place, colors))
+    return table.sample(rng, items, TowerFacts, place=place, colors=colors)
 
 
 def _building_place(
@@ -143,10 +141,10 @@ def _draw_colors(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
 
     points = places.scatter_points(rng, level, X, Y, DISTANCE, allowed, near_middle=True)
     items = [
-        table.block(color, point, COLOR_HALF, rgb, rng.uniform(-YAW, YAW))
-        for (color, rgb), point in zip(table.ORDERED.items(), points, strict=False)
+        table.block("order", point, COLOR_HALF, rgb, rng.uniform(-YAW, YAW))
+        for rgb, point in zip(table.ORDERED.values(), points, strict=False)
     ]
-    return _sample(level, rng, items, points, tuple(item.role for item in items))
+    return _sample(level, rng, items, points, tuple(table.ORDERED)[:level])
 
 
 def _color_slots(scene: Scene) -> Slots:
@@ -242,8 +240,8 @@ def _draw_sizes(level: int, rng: np.random.Generator, workcell: Workcell) -> Sce
     points = places.scatter_blocks(rng, workcell, ground, cubes, lambda i, j: DISTANCE)
     color = table.drawn_color(rng)
     items = [
-        table.block(f"block {i}", point, half, color, rng.uniform(-YAW, YAW))
-        for i, (half, point) in enumerate(zip(halves, points, strict=True))
+        table.block("order", point, half, color, rng.uniform(-YAW, YAW))
+        for half, point in zip(halves, points, strict=True)
     ]
     return _sample(level, rng, items, points)
 
@@ -300,8 +298,8 @@ def _draw_lengths(level: int, rng: np.random.Generator, workcell: Workcell) -> S
     points = places.scatter_blocks(rng, workcell, GROUNDS[min(level, 2)], halves, gap, wide)
     color = table.drawn_color(rng)
     items = [
-        table.block(f"block {i}", point, half, color, rng.uniform(-BAR_YAW, BAR_YAW))
-        for i, (half, point) in enumerate(zip(halves, points, strict=True))
+        table.block("order", point, half, color, rng.uniform(-BAR_YAW, BAR_YAW))
+        for half, point in zip(halves, points, strict=True)
     ]
     return _sample(level, rng, items, points)
 
@@ -351,9 +349,8 @@ def _draw_bowls(level: int, rng: np.random.Generator, workcell: Workcell) -> Sce
     )
     points = places.shuffled(rng, places.scatter(rng, propose, BOWLS_DISTANCE, restarts=RESTARTS))
     items = [table.thing("plate", "plate", plate, table.draw_variant(rng, "plate"), fixed=True)]
-    items += [table.thing(str(i), "bowl", point, BOWL) for i, point in enumerate(points)]
-    bowls = [str(i) for i in range(level)]
-    return table.sample(rng, items, lambda n: BowlsFacts(n["plate"], tuple(n[b] for b in bowls)))
+    items += [table.thing("bowls", "bowl", point, BOWL) for point in points]
+    return table.sample(rng, items, BowlsFacts)
 
 
 def _bowls_plan(scene: Scene) -> tuple[Skill, ...]:
