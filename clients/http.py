@@ -43,6 +43,8 @@ UNAVAILABLE = (
     http.HTTPStatus.GATEWAY_TIMEOUT,
 )
 """The server is not there, or has no room: what stands before it answers in its place."""
+TEXT = "an error"
+"""Code of an answer that is a bare text."""
 STALE_CONNECTION = (http.client.RemoteDisconnected, ConnectionResetError, BrokenPipeError)
 
 
@@ -205,8 +207,8 @@ class JsonServer:
 class HttpSession(StatelessSession):
     """One kept-alive HTTP connection, over which every query is a POST of JSON.
 
-    `path` is used where the URL has none. `silent`: a status that the server answers to any
-    failure, without a reason, and what to say.
+    `path` is used where the URL has none. `silent`: a status (or TEXT) that the server answers to
+    any failure, without a reason, and what to say.
     """
 
     path = "/act"
@@ -232,6 +234,8 @@ class HttpSession(StatelessSession):
         be. Raises what `JsonServer.request` raises."""
         try:
             answer = self._server.request("POST", self.path, body, timeout)
+            if isinstance(answer, str):  # in place of actions, with status 200 (OpenVLA-OFT)
+                raise errors.ServerError(TEXT, answer, True, f"{self._server.url}{self.path}")
         except errors.ServerError as error:
             if error.code == BUSY:
                 raise

@@ -71,7 +71,7 @@ def test_a_declared_length_is_checked_and_its_option_named(name: str) -> None:
     assert "T from 1 to its horizon 4" in str(caught.value)
 
 
-@pytest.mark.parametrize("name", [name for name in DIALECTS if name != "go1"])
+@pytest.mark.parametrize("name", [name for name in DIALECTS if name not in ("go1", "oft")])
 def test_what_the_model_reads_of_an_instruction_is_declared(name: str) -> None:
     with talking(*served(name), text_budget=7) as policy:
         assert policy.spec.text_budget == 7
@@ -171,6 +171,7 @@ def test_a_server_that_does_not_answer_in_time(name: str, monkeypatch: pytest.Mo
 
 LOOKS = {
     "go1": "GO-1's server",
+    "oft": "OpenVLA-OFT's server",
     "xvla": "X-VLA's server",
     "openpi": "an openpi server",
     "xpolicylab": "an XPolicyLab policy server",
@@ -179,6 +180,7 @@ LOOKS = {
 }
 SPOKEN = {
     "go1": "go1+http",
+    "oft": "oft+http",
     "xvla": "xvla+http",
     "openpi": "openpi",
     "xpolicylab": "xpolicylab",

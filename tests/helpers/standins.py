@@ -95,6 +95,12 @@ class StandIn:
         raise NotImplementedError
 
 
+def array_object(value: Any) -> dict[str, Any]:
+    """json_numpy's writing."""
+    data = base64.b64encode(value.tobytes()).decode()
+    return {"__numpy__": data, "dtype": value.dtype.str, "shape": list(value.shape)}
+
+
 def json_numpy(value: Any) -> Any:
     """json_numpy's reading: an object with `__numpy__` is an array."""
     if isinstance(value, dict) and "__numpy__" in value:
@@ -219,6 +225,25 @@ class Go1(Fast):
             return strict_json(np.asarray(self.model(seen)).tolist())
         except Exception as error:
             raise Status(500, b"Internal Server Error") from error
+
+
+class Oft(Fast):
+    """OpenVLA-OFT's deploy.py: arrays nested in the body, any failure a 200 and "error"."""
+
+    scheme = "oft+http"
+
+    def act(self, body: bytes) -> Any:
+        try:
+            seen = json.loads(body, object_hook=json_numpy)
+            assert seen["full_image"].shape == (240, 320, 3) and seen["instruction"].lower()
+            seen["wrists"] = [seen[name] for name in seen if "wrist" in name]
+            self.requests.append(seen)
+            if self.instead is not None:
+                return self.instead
+            rows = self.model(seen)
+            return json.dumps([array_object(np.asarray(row)) for row in rows]).encode()
+        except Exception:
+            return "error"
 
 
 class XVla(Fast):
@@ -463,6 +488,7 @@ class RoboTwin(StandIn):
 
 DIALECTS: dict[str, tuple[Callable[..., Any], str, str]] = {
     "go1": (Go1, "http", ""),
+    "oft": (Oft, "http", ""),
     "openpi": (OpenPi, "socket", ""),
     "xpolicylab": (XPolicyLab, "socket", ""),
     "vla-eval": (VlaEval, "socket", ""),
