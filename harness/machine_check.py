@@ -4,13 +4,14 @@ Every check runs in a process of its own with a time limit: a broken driver may 
 process that asks it, and this is here to say so.
 """
 
-import json
-import subprocess
-import sys
+import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
+from robospa.harness.pool import JobProcess, WorkerDied
+from robospa.harness.running.atomic_file import log_to
 from robospa.harness.running.manifest import this_processor
 
 SETUP = "run `make install` in the repository (it installs what is missing)"
@@ -39,38 +40,33 @@ def run_checks() -> Iterator[SystemCheck]:
     """
     processor = this_processor()
     yield SystemCheck("processor", True, f"{processor.name or 'unnamed'}, {processor}")
-    simulator = _run("simulator", "check_simulator", SETUP)
+    simulator = _run("simulator", check_simulator, SETUP)
     yield simulator
     if simulator.ok:
-        yield _run("physics", "check_physics", SETUP)
-    device = _run("vulkan device", "check_device", DRIVER)
+        yield _run("physics", check_physics, SETUP)
+    device = _run("vulkan device", check_device, DRIVER)
     yield device
     if simulator.ok and device.ok:
-        yield _run("first picture", "check_picture", DRIVER)
+        yield _run("first picture", check_picture, DRIVER)
 
 
-def _run(name: str, function: str, fix: str) -> SystemCheck:
-    """One check function of this module, in a child process."""
-    code = f"from robospa.harness import machine_check as m; m.report(m.{function})"
-    command = [sys.executable, "-W", "ignore", "-c", code]
+def _run(name: str, check: Callable[[], str], fix: str) -> SystemCheck:
+    """What `check` says in a child process, or why it failed."""
+    worker = JobProcess(quiet, check, seconds=TIME_LIMIT, name="check")
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=TIME_LIMIT)
-    except subprocess.TimeoutExpired:
-        return SystemCheck(name, False, f"no answer within {TIME_LIMIT:g} s", fix)
-    lines = done.stdout.splitlines()
-    if lines and lines[-1].startswith("{"):
-        found = json.loads(lines[-1])
-        return SystemCheck(name, found["ok"], found["detail"], "" if found["ok"] else fix)
-    why = (done.stderr.strip().splitlines() or [f"it ended with code {done.returncode}"])[-1]
-    return SystemCheck(name, False, f"the check itself broke: {why}", fix)
-
-
-def report(check: Callable[[], str]) -> None:
-    """Run `check` and print the outcome as one line of JSON: what it says, or why it failed."""
-    try:
-        print(json.dumps({"ok": True, "detail": check()}))
+        return SystemCheck(name, True, worker.run(None))
+    except WorkerDied as error:
+        return SystemCheck(name, False, f"the check itself broke: {error}", fix)
     except Exception as error:  # whatever it is, the reader wants to see it
-        print(json.dumps({"ok": False, "detail": f"{type(error).__name__}: {error}"}))
+        return SystemCheck(name, False, f"{type(error).__name__}: {error}", fix)
+    finally:
+        worker.kill()
+
+
+def quiet(check: Callable[[], str]) -> Callable[[None], str]:
+    """What runs `check` in its process, whose libraries print nothing."""
+    log_to(Path(os.devnull))
+    return lambda _: check()
 
 
 def check_simulator() -> str:

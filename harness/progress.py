@@ -8,7 +8,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, Protocol, TextIO, TypeVar
+from typing import TYPE_CHECKING, TextIO, TypeVar
 
 from robospa.harness.running.status import ServerStats, Status, server_text, shares_text
 from robospa.results.records.trial_record import TrialRecord
@@ -41,7 +41,7 @@ class Bar:
     def __init__(self, what: str, total: int, done: int = 0, stream: TextIO | None = None) -> None:
         self.what, self.total, self.done = what, total, done
         self._stream = stream or sys.stderr
-        self._screen: _Screen | None = None
+        self._screen: _TerminalScreen | _NotebookScreen | None = None
         self._text = ""
         self._shown = self._line = float("-inf")
 
@@ -99,19 +99,6 @@ class Bar:
         bar = ProgressBar(total=max(self.total, 1), completed=self.done, width=28)
         head.add_row(bar, f"{self.done}/{self.total}", Text(self._text))
         return head
-
-
-class _Screen(Protocol):
-    """Shows one picture that changes, and lines that stay."""
-
-    def update(self, picture: RenderableType) -> None:
-        """Show `picture` in place of the one before."""
-
-    def note(self, text: str) -> None:
-        """Add a line that stays."""
-
-    def stop(self) -> None:
-        """Leave the last picture as it is."""
 
 
 class _TerminalScreen:

@@ -40,10 +40,10 @@ Inputs = tuple[tuple[str, int, int], ...]
 class LiveReport:
     """The page of the run in `folder`, made when it is asked for and something has changed."""
 
-    def __init__(self, folder: Path, published: tuple[str, ...] = (), ci: str = "wilson") -> None:
+    def __init__(self, folder: Path, published: tuple[str, ...] = ()) -> None:
         """Raises RunError if there is no run in `folder`."""
         self.folder = folder
-        self._published, self._ci = published, ci
+        self._published = published
         self._lock = threading.Lock()
         self._drawn_folder = TemporaryDirectory(prefix="robospa-view-")
         self._inputs: Inputs = ()
@@ -110,7 +110,7 @@ class LiveReport:
         return tuple(found)
 
     def _make(self, run: Run) -> str:
-        report = make_report(run, self._published, self._ci)
+        report = make_report(run, self._published)
         drawn = Path(self._drawn_folder.name)
         if not run.without_result or time.monotonic() >= self._drawn_at + FIGURES_SECONDS:
             (drawn / FIGURES).mkdir(exist_ok=True)
@@ -118,14 +118,7 @@ class LiveReport:
                 report.runs, report.columns, drawn / FIGURES, FORMATS, report.failures
             )
             self._drawn_at = time.monotonic()
-        return page(
-            report,
-            self._drawings,
-            self.folder,
-            drawn=drawn,
-            formats=(),
-            live=True,
-        )
+        return page(report, self._drawings, self.folder, drawn=drawn, formats=(), live=True)
 
     def video(self, name: str) -> Path | None:
         """The run's video of that name; None if there is none."""

@@ -185,14 +185,7 @@ class ChatEndpoint:
             raise Away(self._said(error), _retry_after(error.response.headers)) from None
         except self._openai.OpenAIError as error:
             raise Away(self._said(error)) from None
-        except (
-            ValueError,
-            LookupError,
-            TypeError,
-            AttributeError,
-            ArithmeticError,
-            RecursionError,
-        ):
+        except UNREADABLE:
             raise Away(f"{given.endpoint} answered something that is no completion") from None
         used["requests"] += 1
         used["seconds"] += time.monotonic() - began

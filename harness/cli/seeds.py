@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -46,6 +45,9 @@ def seeds(
     was stopped.
     """
     from robospa.harness.running.status import cores
+    from robospa.harness.seeds.attempt import Evidence
+    from robospa.harness.seeds.lists import local_file, local_folder, save
+    from robospa.harness.seeds.sweep import searches, sweep_with_bar
     from robospa.harness.selection import (
         canonical_mode,
         parse_embodiments,
@@ -71,33 +73,11 @@ def seeds(
         if len(missing) < len(keys) and not as_json:
             print(f"{len(keys) - len(missing)} of {len(keys)} lists are there already")
         keys = missing
-    if not _sweep(
-        keys, start, count, workers or cores(), out, check=check, fresh=fresh, as_json=as_json
-    ):
-        raise typer.Exit(1)
-
-
-def _sweep(
-    keys: Sequence[ListKey],
-    start: int,
-    count: int,
-    workers: int,
-    out: Path | None,
-    *,
-    check: bool,
-    fresh: bool,
-    as_json: bool,
-) -> bool:
-    """Make the lists, or only `check`; whether the expert solves all of `keys` often enough."""
-    from robospa.harness.seeds.attempt import Evidence
-    from robospa.harness.seeds.lists import local_file, local_folder, save
-    from robospa.harness.seeds.sweep import searches, sweep_with_bar
-
     console, solved = plain_console(quiet=as_json), True
     rows: list[dict[str, object]] = []
     evidence = Evidence(local_folder() / "attempts")
     wanted = searches(keys, start, count, evidence, measure=check, fresh=fresh)
-    for search in sweep_with_bar(wanted, workers, evidence):
+    for search in sweep_with_bar(wanted, workers or cores(), evidence):
         key, found = search.key, search.accepted
         text = f"{key}: {len(found)} of {len(search.row())} seeds accepted"
         if not check and search.given_up:
@@ -112,7 +92,8 @@ def _sweep(
         rows.append({**key._asdict(), "accepted": list(found), "refused": refused})
     if as_json:
         print(json.dumps(rows, indent=1))
-    return solved
+    if not solved:
+        raise typer.Exit(1)
 
 
 def _is_there(key: ListKey, count: int, folder: Path | None) -> bool:

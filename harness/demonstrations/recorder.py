@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.harness.sim.motion import RATE
+from robospa.harness.trial import Recorder
 from robospa.harness.world import RenderableState, StepResult, World
 from robospa.observation import CameraSpec
 from robospa.protocol.policy import PolicySpec
@@ -61,8 +62,8 @@ class RecordedFrame:
         return self.step / RATE
 
 
-class FrameRecorder:
-    """A `Recorder` (`robospa.harness.trial`) that keeps a frame every `stride` physics steps of an
+class FrameRecorder(Recorder):
+    """Keeps a frame every `stride` physics steps of an
     action, and at its end.
 
     A frame less than half a stride before an action's end is replaced by that one. `stride` is
@@ -115,9 +116,6 @@ class FrameRecorder:
         if began < kept and self._ended - kept < self.stride / 2:
             self.frames.pop()
         self._keep(world, self._ended)
-
-    def ended(self, world: World) -> None:
-        """Nothing: an action ended before."""
 
     def _keep(self, world: World, step: int) -> None:
         seen, measured = world.observe(self._commanded), world.observe(MEASURED)["state"]

@@ -24,8 +24,15 @@ from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.robots.kinematics import chain_of
 from robospa.harness.seeds.lists import find_list
 from robospa.harness.settings import SettingsError
-from robospa.harness.trial import TrialState, open_trial, policy_seed, record_of, step_limit
-from robospa.harness.world import ActionError, StepResult, World
+from robospa.harness.trial import (
+    Recorder,
+    TrialState,
+    open_trial,
+    policy_seed,
+    record_of,
+    step_limit,
+)
+from robospa.harness.world import ActionError, World
 from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS, open_world
 from robospa.observation import CAMERAS, DEFAULT_CAMERAS, WIDTH, CameraSpec
 from robospa.protocol.errors import PolicyError
@@ -269,7 +276,7 @@ def space_of(name: str, value: Any) -> Any:
     return value if isinstance(value, str) else np.array(value, dtype=np.float32)
 
 
-class _Watcher:
+class _Watcher(Recorder):
     """Draws the window while actions are executed."""
 
     def __init__(self, env: TaskEnv) -> None:
@@ -282,12 +289,6 @@ class _Watcher:
         if time >= self._next:
             self._next = time + FRAME_SECONDS
             self._env.render()
-
-    def executed(self, world: World, action: NDArray[np.float32], done: StepResult) -> None:
-        """The window shows it already."""
-
-    def ended(self, world: World) -> None:
-        """The last picture stays."""
 
 
 class Window:

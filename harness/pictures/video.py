@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.harness.replay import replay_record
-from robospa.harness.trial import TrialSetup, task_parts
-from robospa.harness.world import RenderableState, StepResult, World
+from robospa.harness.trial import Recorder, TrialSetup, task_parts
+from robospa.harness.world import RenderableState, World
 from robospa.observation import CameraSpec
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
@@ -30,13 +30,12 @@ SIZE, INSET = (480, 360), (160, 120)
 """Width and height of the first camera's picture, and of the others' [px]."""
 
 
-class FilmRecorder:
-    """A `Recorder` that draws a trial while it is played, as an H.264 file that grows in memory:
-    the first camera in `size`, with the others at its left edge. While nothing moves, one picture
-    serves for all."""
+class FilmRecorder(Recorder):
+    """Draws a trial while it is played, as an H.264 file that grows in memory: the first camera in
+    SIZE, with the others at its left edge. While nothing moves, one picture serves for all."""
 
-    def __init__(self, cameras: Sequence[str] = CAMERAS, size: tuple[int, int] = SIZE) -> None:
-        sizes = [size, *[INSET] * (len(cameras) - 1)]
+    def __init__(self, cameras: Sequence[str] = CAMERAS) -> None:
+        sizes = [SIZE, *[INSET] * (len(cameras) - 1)]
         self._cameras = [CameraSpec(name, *each) for name, each in zip(cameras, sizes, strict=True)]
         self._bytes = io.BytesIO()
         self._file: Any = None
@@ -76,9 +75,6 @@ class FilmRecorder:
         if time >= self._due - 1e-6:
             self._due += EVERY
             self._show(world)
-
-    def executed(self, world: World, action: NDArray[np.float32], done: StepResult) -> None:
-        """A film shows times, not actions."""
 
     def ended(self, world: World) -> None:
         """Show the last view for half a second."""

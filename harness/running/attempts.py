@@ -52,8 +52,7 @@ class LossWriter:
 
     def write(self, key: TrialKey, message: str, retries: Retries) -> TrialRecord:
         """The record of a trial without a result, which is then on disk; raises StorageError."""
-        if self._writer is None:
-            self._writer = RecordWriter(self._folder)
+        self._writer = self._writer or RecordWriter(self._folder)
         record = loss_record(key, message, retries, self._queue)
         self._writer.write(record)
         return record

@@ -72,21 +72,17 @@ class RayWorker(WorkerHandle):
         self._executor = executor
 
     def send(self, command: Command) -> None:
-        """Send it a command; nothing happens if it has ended."""
         if self.ended is None and self.actor is not None:
             self.actor.send.remote(command)
 
     def messages(self) -> list[Message]:
-        """What it has sent since the last call."""
         received, self.inbox = self.inbox, []
         return received
 
     def exit_status(self) -> str | None:
-        """How it ended; None while it runs."""
         return self.ended
 
     def pending(self) -> bool:
-        """Whether no node has started it yet."""
         return not self.started
 
     def kill(self) -> None:
@@ -95,7 +91,6 @@ class RayWorker(WorkerHandle):
         self.close()
 
     def join(self, seconds: float) -> None:
-        """Wait until it has ended, `seconds` at most."""
         until = time.monotonic() + seconds
         while self.ended is None and self.started and time.monotonic() < until:
             self._executor.wait([self], until - time.monotonic())
@@ -157,7 +152,6 @@ class RayExecutor(Executor):
         return worker
 
     def wait(self, workers: Sequence[WorkerHandle], seconds: float) -> None:
-        """Return as soon as one has reported, after `seconds` at most."""
         try:
             self._update_nodes()
             self._place_workers()
@@ -176,7 +170,6 @@ class RayExecutor(Executor):
             self._receive(waiting[call])
 
     def notes(self) -> list[str]:
-        """Lines about nodes that were left out or are missing."""
         notes, self._notes = self._notes, []
         return notes
 
@@ -321,8 +314,7 @@ class RayExecutor(Executor):
         for message in report.messages:
             worker.ready |= isinstance(message, WorkerReady)
             if isinstance(message, TrialDone):
-                if self._writer is None:
-                    self._writer = RecordWriter(self._folder)
+                self._writer = self._writer or RecordWriter(self._folder)
                 self._writer.write(message.record)
         worker.inbox += report.messages
         worker.ended = report.exit_status

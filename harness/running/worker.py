@@ -366,7 +366,6 @@ class LocalWorker(executor.WorkerHandle):
         self._spare = list(spare)
 
     def another_trial(self) -> LocalWorker | None:
-        """A place for one more trial; None if there is none."""
         return LocalWorker(self.process, self._spare.pop(), self.name) if self._spare else None
 
     def send(self, command: executor.Command) -> None:
@@ -376,7 +375,6 @@ class LocalWorker(executor.WorkerHandle):
                 pipe.send(command)
 
     def messages(self) -> list[executor.Message]:
-        """What it has sent since the last call; also after it has ended."""
         received: list[executor.Message] = []
         try:
             while self.pipe.poll():
@@ -386,19 +384,15 @@ class LocalWorker(executor.WorkerHandle):
         return received
 
     def exit_status(self) -> str | None:
-        """How it ended; None while it runs."""
         return self.process.exit_status()
 
     def kill(self) -> None:
-        """End it now."""
         self.process.kill()
 
     def join(self, seconds: float) -> None:
-        """Wait until it has ended, `seconds` at most."""
         self.process.join(seconds)
 
     def close(self) -> None:
-        """Free what is left of it."""
         self.process.close()
 
 
@@ -410,7 +404,6 @@ class LocalExecutor(executor.Executor):
         self.workers = workers
 
     def capacity(self) -> int:
-        """As many as were asked for."""
         return self.workers
 
     def start(self, name: str) -> LocalWorker:
@@ -420,5 +413,4 @@ class LocalExecutor(executor.Executor):
         return LocalWorker(process, first, name, spare)
 
     def wait(self, workers: Sequence[executor.WorkerHandle], seconds: float) -> None:
-        """Return as soon as one of `workers` has sent something or ended, or after `seconds`."""
         wait([worker.pipe for worker in workers if isinstance(worker, LocalWorker)], seconds)

@@ -2,11 +2,10 @@
 
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
@@ -103,18 +102,11 @@ def expert_pool(workers: int, salt: str = "") -> Pool[SeedJob, Attempt]:
     return Pool(start, max(1, workers), crashed=crashed)
 
 
-class _Row(msgspec.Struct, frozen=True):
-    """A line."""
+class _Where(msgspec.Struct):
+    """What a line says besides its attempt."""
 
     level: int
     inputs: str
-    seed: int
-    accepted: bool
-    reason: str
-    digest: str
-    physics_steps: int
-    steps: int
-    seconds: float
 
 
 class Evidence:
@@ -135,13 +127,12 @@ class Evidence:
             return found
         for line in path.read_bytes().split(b"\n"):
             try:
-                row = msgspec.json.decode(line, type=_Row)
+                where = msgspec.json.decode(line, type=_Where)
+                item = msgspec.json.decode(line, type=Attempt)
             except msgspec.DecodeError:
                 continue
-            if row.level == key.level and row.inputs == inputs:
-                fields: Mapping[str, Any] = msgspec.structs.asdict(row)
-                given = {k: v for k, v in fields.items() if k not in ("level", "inputs")}
-                found[row.seed] = Attempt(**given)
+            if (where.level, where.inputs) == (key.level, inputs):
+                found[item.seed] = item
         return found
 
     def add(self, key: ListKey, inputs: str, item: Attempt) -> None:

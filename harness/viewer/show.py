@@ -18,13 +18,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
-import numpy as np
-from numpy.typing import NDArray
-
 from robospa.extras import need
 from robospa.geometry import Pose
 from robospa.harness.replay import replay_record
-from robospa.harness.trial import TrialSetup, run_trial, task_parts
+from robospa.harness.trial import Recorder, TrialSetup, run_trial, task_parts
 from robospa.harness.viewer.playback import (
     DrawnBody,
     DrawnMesh,
@@ -32,7 +29,7 @@ from robospa.harness.viewer.playback import (
     drawn_bodies,
     playback_of,
 )
-from robospa.harness.world import StepResult, World
+from robospa.harness.world import World
 from robospa.protocol.policy import Policy
 from robospa.results.records.manifest import RunError
 from robospa.results.records.runs import Run, finished, read_run
@@ -55,7 +52,7 @@ class HasBodies(Protocol):
         ...
 
 
-class PoseRecorder:
+class PoseRecorder(Recorder):
     """A `Recorder` of where everything is, ten times a simulated second."""
 
     def __init__(self) -> None:
@@ -68,9 +65,6 @@ class PoseRecorder:
     def polled(self, world: World, time: float) -> None:
         if time >= self.times[-1] + EVERY - 1e-6:
             self._keep(world, time)
-
-    def executed(self, world: World, action: NDArray[np.float32], done: StepResult) -> None:
-        """A playback shows times, not actions."""
 
     def ended(self, world: World) -> None:
         self._keep(world, world.snapshot().time)
@@ -99,11 +93,7 @@ def recorded_playback(
     return _playback(record, parts(record.key), recorder)
 
 
-def policy_playback(
-    world: World,
-    policy: Policy,
-    key: TrialKey,
-) -> Playback:
+def policy_playback(world: World, policy: Policy, key: TrialKey) -> Playback:
     """The trial `key` with `policy`, run now; passes on what `world` and `policy` raise."""
     recorder = PoseRecorder()
     record = run_trial(world, policy, key, policy_seed=0, recorder=recorder)
@@ -160,7 +150,6 @@ def of_expert(key: TrialKey) -> tuple[Playback, list[DrawnBody]]:
     from robospa.harness.robots import embodiment
     from robospa.harness.seeds.attempt import ORACLE
     from robospa.harness.sim.sapien_world import SapienWorld
-    from robospa.harness.trial import task_parts
 
     need("viser")
     with closing(SapienWorld(render=False)) as world:
