@@ -74,9 +74,11 @@ class Recorder(Protocol):
 
     def executed(self, world: World, action: NDArray[np.float32], done: StepResult) -> None:
         """`action` has just been executed."""
+        return
 
     def ended(self, world: World) -> None:
         """The trial is over."""
+        return
 
 
 @dataclass(frozen=True)
