@@ -105,7 +105,7 @@ class RoboSPABenchmark(StepBenchmark):
     def get_observation_spec(self) -> dict[str, DimSpec]:
         """Three pictures, joints and text."""
         images = dict.fromkeys(NAMES.values(), IMAGE_RGB)
-        return {**images, "joint_state": STATE_JOINT, "language": LANGUAGE}
+        return {**images, "state": STATE_JOINT, "language": LANGUAGE}
 
     def cleanup(self) -> None:
         """Close the simulator."""
