@@ -29,7 +29,6 @@ from robospa.harness.settings import (
     GROUPS,
     LEAST_STUCK_SECONDS,
     EvaluationSettings,
-    Recording,
     Selection,
     SettingsError,
     Simulation,
@@ -178,18 +177,6 @@ def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
 def test_values_that_are_no_choice_are_refused(wrong: dict[str, str]) -> None:
     with pytest.raises(SettingsError, match=next(iter(wrong))):
         updated(DEFAULTS, wrong)
-
-
-def test_choices_hold_for_settings_made_in_python_too() -> None:
-    with pytest.raises(
-        SettingsError, match="video 'some' is not one of none, failures, first, all"
-    ):
-        Recording(video="some")
-
-
-def test_an_unknown_keyword_is_answered_with_the_nearest() -> None:
-    with pytest.raises(SettingsError, match="no setting 'trails'; did you mean trials"):
-        updated(DEFAULTS, {"trails": 3})
 
 
 def test_a_worker_that_gets_on_is_not_taken_for_stuck() -> None:

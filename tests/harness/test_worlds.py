@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_line import robospa
 from run_fakes import KEYED, SPEC, FakePolicy, FakeWorld, NanPolicy, parts
 
 from robospa.harness import machine_check
-from robospa.harness.cli.main import main
 from robospa.harness.server_checks import rollouts, trial_for
 from robospa.harness.settings import EvaluationSettings, SettingsError, updated
 from robospa.harness.sim.vulkan import Device
@@ -264,20 +264,16 @@ def rows(*verdicts: bool | None) -> Callable[..., Iterator[CheckResult]]:
     ("verdicts", "code"), [((True, True), 0), ((True, False), 1), ((None,), 0)]
 )
 def test_the_command_counts_them(
-    verdicts: tuple[bool | None, ...],
-    code: int,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    verdicts: tuple[bool | None, ...], code: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("robospa.harness.server_checks.rollouts", rows(*verdicts))
-    with ServerThread(policy_factory=FakePolicy) as server, pytest.raises(SystemExit) as end:
-        main(["check", server.url, "--load-seconds", "0"])
-    assert (end.value.code or 0) == code
-    assert f"real trial {len(verdicts)}" in capsys.readouterr().out
+    with ServerThread(policy_factory=FakePolicy) as server:
+        done = robospa("check", server.url, "--load-seconds", "0")
+    assert done.code == code and f"real trial {len(verdicts)}" in done.out
 
 
 @pytest.mark.sim
-def test_a_real_world_and_a_policy_that_holds_still(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_real_world_and_a_policy_that_holds_still() -> None:
     class Still(FakePolicy):
         def infer(self, observation: Any) -> Any:
             return np.tile(observation["state"], (50, 1))

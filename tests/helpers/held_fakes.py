@@ -17,9 +17,11 @@ from run_fakes import FakeWorld
 
 from robospa.harness.running.executor import (
     Command,
+    Executor,
     Message,
     RunTrial,
     TrialDone,
+    WorkerHandle,
     WorkerReady,
 )
 from robospa.harness.running.heartbeat import ComputeLock
@@ -44,7 +46,7 @@ class LoneWorld(FakeWorld):
 
 
 @dataclass
-class ThreadPlace:
+class ThreadPlace(WorkerHandle):
     """A place for a trial in a thread of this process."""
 
     name: str
@@ -66,9 +68,6 @@ class ThreadPlace:
     def exit_status(self) -> str | None:
         return None
 
-    def pending(self) -> bool:
-        return False
-
     def kill(self) -> None: ...
 
     def join(self, seconds: float) -> None: ...
@@ -78,7 +77,7 @@ class ThreadPlace:
             pipe.close()
 
 
-class ThreadExecutor:
+class ThreadExecutor(Executor):
     """One worker whose places are threads; `ended` of them have ended when it is closed."""
 
     def __init__(self, config: WorkerConfig, concurrent_trials: int) -> None:
@@ -95,21 +94,14 @@ class ThreadExecutor:
         for _ in range(self.concurrent_trials):
             ours, theirs = Pipe()
             pipes.append(ours)
-            arguments = (
-                theirs,
-                self.config,
-                writer,
-                ComputeLock(lock) if self.concurrent_trials > 1 else None,
-            )
+            turn = ComputeLock(lock) if self.concurrent_trials > 1 else None
+            arguments = (theirs, self.config, writer, turn)
             self.threads.append(threading.Thread(target=_hold, args=arguments, daemon=True))
             self.threads[-1].start()
         return ThreadPlace(name, pipes[0], pipes[1:])
 
     def wait(self, workers: Sequence[Any], seconds: float) -> None:
         wait([worker.pipe for worker in workers], timeout=seconds)
-
-    def notes(self) -> list[str]:
-        return []
 
     def close(self) -> None:
         for thread in self.threads:
@@ -127,7 +119,7 @@ class ScriptedWorker:
 
 
 @dataclass
-class ScriptedPlace:
+class ScriptedPlace(WorkerHandle):
     name: str
     worker: ScriptedWorker
     number: int
@@ -152,9 +144,6 @@ class ScriptedPlace:
     def exit_status(self) -> str | None:
         return "signal 11" if self.worker.dead else None
 
-    def pending(self) -> bool:
-        return False
-
     def kill(self) -> None:
         self.worker.dead = True
 
@@ -163,7 +152,7 @@ class ScriptedPlace:
     def close(self) -> None: ...
 
 
-class ScriptedExecutor:
+class ScriptedExecutor(Executor):
     """One worker at a time, which dies of the trials that `deadly` names and does all others."""
 
     def __init__(self, concurrent_trials: int, deadly: Callable[[TrialKey], bool]) -> None:
@@ -198,8 +187,5 @@ class ScriptedExecutor:
         for place in workers:
             if (key := worker.running.pop(place.number, None)) is not None:
                 place.inbox.append(TrialDone(trial_record(key, True)))
-
-    def notes(self) -> list[str]:
-        return []
 
     def close(self) -> None: ...

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_line import robospa
 from wire_helpers import QUICK, TRIAL, Recall, observation
 
 from robospa.clients import connect, find_endpoint
-from robospa.harness.cli.main import main, sentence
+from robospa.harness.cli.main import sentence
 from robospa.protocol.client import connect as connect_ours
 from robospa.protocol.errors import (
     ServerError,
@@ -101,14 +102,10 @@ URLS = (
 
 @pytest.mark.parametrize("url", URLS)
 @pytest.mark.parametrize("command", ["eval", "check"])
-def test_no_command_repeats_or_keeps_one(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], url: str, command: str
-) -> None:
-    with pytest.raises(SystemExit) as stop:
-        main([command, url, *(["--out", str(tmp_path / "run")] if command == "eval" else [])])
-    said = capsys.readouterr()
-    assert stop.value.code != 0
-    assert "hunter2" not in said.out + said.err
+def test_no_command_repeats_or_keeps_one(tmp_path: Path, url: str, command: str) -> None:
+    done = robospa(command, url, *(["--out", tmp_path / "run"] if command == "eval" else []))
+    assert done.code != 0
+    assert "hunter2" not in done.out + done.err
     assert list(tmp_path.iterdir()) == []
 
 

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_line import Done, robospa
 from replay_fakes import CHUNK, Learned, episode, grippers, joints
 
-from robospa.harness.cli.main import main
 from robospa.harness.convention_check.episodes import write_episode
 from robospa.harness.convention_check.initial_actions import hints
 from robospa.protocol.server import ServerThread
@@ -22,43 +22,32 @@ def demo(tmp_path: Path) -> Path:
     return path
 
 
-def check(
-    words: list[str], make: Any, capsys: pytest.CaptureFixture[str], monkeypatch: Any
-) -> tuple[int, str, str]:
-    monkeypatch.setenv("COLUMNS", "200")
-    with ServerThread(policy_factory=make) as server, pytest.raises(SystemExit) as end:
-        main(["check", server.url, "--trials", "0", "--load-seconds", "0", *words])
-    out, err = capsys.readouterr()
-    return int(end.value.code or 0), out, err
+def check(words: list[object], make: Any) -> Done:
+    with ServerThread(policy_factory=make) as server:
+        return robospa("check", server.url, "--trials", "0", "--load-seconds", "0", *words)
 
 
-def test_a_right_policy_passes(
-    demo: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    code, out, _ = check(["--demo", str(demo)], lambda: Learned(MADE), capsys, monkeypatch)
+def test_a_right_policy_passes(demo: Path) -> None:
+    code, out, _ = check(["--demo", demo], lambda: Learned(MADE))
     assert code == 0 and "It fits the demonstration" in out and "can be evaluated" in out
 
 
-def test_a_wrong_one_fails_with_the_mistake_in_a_sentence_and_a_table(
-    demo: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_wrong_one_fails_with_the_mistake_in_a_sentence_and_a_table(demo: Path) -> None:
     def make() -> Learned:
         return Learned(MADE, grippers(lambda g: 1 - g))
 
-    code, out, _ = check(["--demo", str(demo), "--points", "5"], make, capsys, monkeypatch)
+    code, out, _ = check(["--demo", demo, "--points", "5"], make)
     assert code == 1
     assert "It looks as if 1 is a closed gripper in its actions" in out
     assert "left gripper" in out and "as it is" in out and "can be evaluated" not in out
 
 
 def test_a_file_that_cannot_be_read_is_one_sentence_before_the_server_is_asked(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
 ) -> None:
     (tmp_path / "no.hdf5").write_text("no")
-    with pytest.raises(SystemExit) as end:
-        main(["check", "ws://127.0.0.1:9", "--demo", str(tmp_path / "no.hdf5")])
-    out, err = capsys.readouterr()
-    assert end.value.code == 1 and not out
+    code, out, err = robospa("check", "ws://127.0.0.1:9", "--demo", tmp_path / "no.hdf5")
+    assert code == 1 and not out
     assert err.count("\n") == 1 and "cannot be read as an HDF5 demonstration" in err
 
 
@@ -99,8 +88,6 @@ def test_a_model_that_always_closes_is_not_accused_of_inverted_grippers() -> Non
     assert "closed gripper" not in "; ".join(found)
 
 
-def test_hints_do_not_fail_a_server(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    code, out, _ = check([], lambda: Begins(MADE, FIRST["metres"][0]), capsys, monkeypatch)
+def test_hints_do_not_fail_a_server() -> None:
+    code, out, _ = check([], lambda: Begins(MADE, FIRST["metres"][0]))
     assert code == 0 and "openings in metres" in out

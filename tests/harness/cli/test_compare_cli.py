@@ -7,44 +7,35 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from command_line import robospa
 from fake_runs import outcomes, write
 from run_fakes import FakePolicy
 
 from robospa.harness import machine_check
-from robospa.harness.cli.main import COMMANDS, main
+from robospa.harness.cli.main import COMMANDS
 from robospa.protocol.server import ServerThread
 from robospa.results.paper.columns import published_results
 from robospa.tasks.catalog import build_scene, tasks
 
 
-def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
-    with pytest.raises(SystemExit) as stop:
-        main(words)
-    said = capsys.readouterr()
-    code = stop.value.code
-    return (code if isinstance(code, int) else 0), said.out, said.err
-
-
-def test_published_models_are_compared(capsys: pytest.CaptureFixture[str]) -> None:
-    code, text, _ = run(capsys, "compare", "pi0.5", "X-VLA")
+def test_published_models_are_compared() -> None:
+    code, text, _ = robospa("compare", "pi0.5", "X-VLA")
     assert code == 0
     assert "SR of π0.5 minus X-VLA" in text
     assert "+2.4 [+1.0, +3.7]" in text  # overall at L5
     assert "MOVER on Wilson" in text
 
 
-def test_a_run_against_the_paper_has_a_banner_and_names_over_its_columns(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_a_run_against_the_paper_has_a_banner_and_names_over_its_columns(tmp_path: Path) -> None:
     write(tmp_path / "a-run-with-a-long-name", outcomes("Pick_Blocks_Size", 1, [1] * 9 + [0]))
     folder = str(tmp_path / "a-run-with-a-long-name")
-    code, text, _ = run(capsys, "compare", folder, "pi05")
+    code, text, _ = robospa("compare", folder, "pi05")
     assert code == 0
     banner = text.splitlines()[0]
     for word in ("Another suite", "π0.5", "seeds", "object meshes", "renderer", "sentences"):
         assert word in banner
     assert re.search(r"level +\S*with-a-long-name +π0\.5 +difference", text)
-    code, text, _ = run(capsys, "compare", folder, "pi05", "--json")
+    code, text, _ = robospa("compare", folder, "pi05", "--json")
     found = json.loads(text)
     assert code == 0 and found["banner"] == banner and len(found["cells"]) == 1
 
@@ -54,12 +45,12 @@ def test_a_model_is_found_however_it_is_written(name: str) -> None:
     assert published_results(name).name == "π0.5"
 
 
-def test_sample_sizes(capsys: pytest.CaptureFixture[str]) -> None:
-    code, text, _ = run(capsys, "compare", "--power", "--base", "0.2")
+def test_sample_sizes() -> None:
+    code, text, _ = robospa("compare", "--power", "--base", "0.2")
     assert code == 0
     assert "5 points: 1092 on unrelated seeds; on equal seeds 825 if phi is 0.25" in text
     words = ["--tasks", "GAC", "--levels", "5", "--json"]
-    found = json.loads(run(capsys, "compare", "--power", *words)[1])
+    found = json.loads(robospa("compare", "--power", *words)[1])
     assert found["variants"] == 4 and found["differences"][1]["unpaired"] == 1092
     assert set(found["half_widths"]["10"]) == {"RDT", "GO-1", "pi0.5", "X-VLA"}
 
@@ -76,17 +67,15 @@ def test_sample_sizes(capsys: pytest.CaptureFixture[str]) -> None:
         (["report", "nowhere", "--lint"], "nowhere is not a run"),
     ],
 )
-def test_mistakes_are_one_sentence(
-    capsys: pytest.CaptureFixture[str], words: list[str], said: str
-) -> None:
-    code, _, error = run(capsys, *words)
+def test_mistakes_are_one_sentence(words: list[str], said: str) -> None:
+    code, _, error = robospa(*words)
     assert code == 1
     assert said in error
     assert error.count("\n") == 1
 
 
-def test_lint_of_the_paper_fails_with_its_findings(capsys: pytest.CaptureFixture[str]) -> None:
-    code, text, _ = run(capsys, "report", "paper", "--lint")
+def test_lint_of_the_paper_fails_with_its_findings() -> None:
+    code, text, _ = robospa("report", "paper", "--lint")
     assert code == 1
     assert "8 errors, 0 warnings" in text
 
@@ -94,18 +83,8 @@ def test_lint_of_the_paper_fails_with_its_findings(capsys: pytest.CaptureFixture
 # ------------------------------------------------------------ `robospa paper` from the command line
 
 
-def run_paper(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
-    with pytest.raises(SystemExit) as stop:
-        main(("paper", *words))
-    said = capsys.readouterr()
-    code = stop.value.code
-    return (code if isinstance(code, int) else 0), said.out, said.err
-
-
-def test_all_tables_are_written_and_the_errata_told(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    code, out, _ = run_paper(capsys, "--out", str(tmp_path / "paper"), "--no-figures")
+def test_all_tables_are_written_and_the_errata_told(tmp_path: Path) -> None:
+    code, out, _ = robospa("paper", "--out", str(tmp_path / "paper"), "--no-figures")
     assert code == 0
     assert "Overall average" in out
     assert "2747 printed cells walked; 22 do not follow" in out
@@ -114,9 +93,9 @@ def test_all_tables_are_written_and_the_errata_told(
     assert {"tables.md", "tables.tex", "tables.html", "tables.csv", "main.tex"} <= names
 
 
-def test_what_is_printed_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_what_is_printed_as_json(tmp_path: Path) -> None:
     words = ("--out", str(tmp_path / "p"), "--table", "basic", "--format", "md", "--json")
-    code, out, _ = run_paper(capsys, *words)
+    code, out, _ = robospa("paper", *words)
     found = json.loads(out)
     assert code == 0 and found["checked"] == 2747 and len(found["errata"]) == 22
     assert found["files"] == [str(tmp_path / "p" / "tables.md")]
@@ -135,9 +114,9 @@ def test_what_is_printed_as_json(capsys: pytest.CaptureFixture[str], tmp_path: P
     ],
 )
 def test_mistakes_are_one_sentence_and_write_nothing(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, words: tuple[str, ...], said: str
+    tmp_path: Path, words: tuple[str, ...], said: str
 ) -> None:
-    code, out, err = run_paper(capsys, "--out", str(tmp_path / "p"), *words)
+    code, out, err = robospa("paper", "--out", str(tmp_path / "p"), *words)
     assert (code, out) == (1, "")
     assert said in err
     assert len(err.splitlines()) == 1
@@ -147,28 +126,14 @@ def test_mistakes_are_one_sentence_and_write_nothing(
 # --------------- help as wide as the terminal, completion by the shell, and JSON for other programs
 
 
-def output(capsys: pytest.CaptureFixture[str], *words: str) -> str:
-    with pytest.raises(SystemExit) as end:
-        main(words)
-    out, err = capsys.readouterr()
-    assert not end.value.code, err
-    return out
-
-
 @pytest.mark.parametrize("columns", [60, 80, 118])
-def test_help_is_as_wide_as_the_terminal(
-    columns: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", str(columns))
-    widths = [len(line) for line in output(capsys, "eval", "--help").splitlines()]
+def test_help_is_as_wide_as_the_terminal(columns: int) -> None:
+    widths = [len(line) for line in robospa("eval", "--help", columns=columns).out.splitlines()]
     assert columns - 16 < max(widths) <= columns
 
 
-def test_the_list_of_commands_is_not_cut(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "80")
-    text = " ".join(output(capsys, "--help").split()).partition("Evaluate a policy:")[2]
+def test_the_list_of_commands_is_not_cut() -> None:
+    text = " ".join(robospa("--help", columns=80).out.split()).partition("Evaluate a policy:")[2]
     assert "..." not in text
     assert [summary for summary in COMMANDS.values() if summary not in text] == []
 
@@ -183,49 +148,39 @@ def test_the_list_of_commands_is_not_cut(
         ("robospa submit ve", "verify"),
     ],
 )
-def test_the_shell_completes(
-    line: str,
-    expected: str,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_shell_completes(line: str, expected: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("_ROBOSPA_COMPLETE", "complete_bash")
     monkeypatch.setenv("COMP_WORDS", line)
     monkeypatch.setenv("COMP_CWORD", str(line.count(" ")))
-    assert output(capsys).split() == expected.split()
+    assert robospa().out.split() == expected.split()
 
 
-def test_tasks_as_json(capsys: pytest.CaptureFixture[str]) -> None:
-    listed = json.loads(output(capsys, "tasks", "--json"))
+def test_tasks_as_json() -> None:
+    listed = json.loads(robospa("tasks", "--json").out)
     assert [row["name"] for row in listed] == list(tasks())
     assert listed[0]["levels"]["5"] == {"candidates": 6, "subtasks": 1, "steps": 150}
-    scene = json.loads(output(capsys, "tasks", "pick blocks size", "--level", "2", "--json"))
+    scene = json.loads(robospa("tasks", "pick blocks size", "--level", "2", "--json").out)
     assert scene["digest"] == build_scene("Pick_Blocks_Size", 2, 100000).digest
     assert set(scene["instructions"]) == {"train", "heldout", "indirect"}
     assert scene["plan"][0]["skill"] == "Pick"
 
 
-def test_a_server_s_checks_as_json(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_server_s_checks_as_json(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         machine_check,
         "run_checks",
         lambda: iter([machine_check.SystemCheck("simulator", True, "fine")]),
     )
     with ServerThread(policy_factory=FakePolicy) as server:
-        found = json.loads(
-            output(capsys, "check", server.url, "--trials", "0", "--load-seconds", "0", "--json")
-        )
-        machine = json.loads(output(capsys, "check", "--json"))
+        words = ("--trials", "0", "--load-seconds", "0", "--json")
+        found = json.loads(robospa("check", server.url, *words).out)
+        machine = json.loads(robospa("check", "--json").out)
     assert found["url"] == server.url and found["passed"]
     assert {"name", "passed", "detail"} == set(found["checks"][0])
     assert machine["checks"] == [{"name": "simulator", "ok": True, "detail": "fine", "fix": ""}]
 
 
-def test_figures_are_drawn_of_all_columns(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_figures_are_drawn_of_all_columns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[list[str], Path]] = []
 
     def draw(runs: Any, columns: Any, folder: Path) -> list[SimpleNamespace]:
@@ -233,7 +188,7 @@ def test_figures_are_drawn_of_all_columns(
         return [SimpleNamespace(name="one")]
 
     monkeypatch.setattr("robospa.results.report.report.draw_figures", draw)
-    code, out, _ = run_paper(capsys, "--out", str(tmp_path / "p"), "--format", "csv")
+    code, out, _ = robospa("paper", "--out", str(tmp_path / "p"), "--format", "csv")
     assert code == 0
     assert asked == [(["RDT", "GO-1", "π0.5", "X-VLA"], tmp_path / "p" / "figures")]
     assert "1 figures in" in out

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import pytest
+from command_line import robospa
 
-from robospa.harness.cli.main import main
 from robospa.harness.factory import policy_names
 
 pytestmark = [
@@ -13,14 +13,10 @@ pytestmark = [
 ]
 
 
-def test_the_demo_leaves_a_page_of_mistakes_and_expert_with_films(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_demo_leaves_a_page_of_mistakes_and_expert_with_films(tmp_path: Path) -> None:
     words = ["demo", "--tasks", "Pick_Blocks_Size", "--levels", "1", "--workers", "1"]
-    with pytest.raises(SystemExit) as end:
-        main([*words, "--video", "all", "--out", str(tmp_path / "demo")])
-    assert end.value.code == 0
-    assert "Pick Blocks Size" in capsys.readouterr().out
+    done = robospa(*words, "--video", "all", "--out", tmp_path / "demo")
+    assert done.code == 0 and "Pick Blocks Size" in done.out
     report = tmp_path / "demo" / "report"
     assert len(list((report / "videos").rglob("*.mp4"))) == 2
     page = (report / "report.html").read_text()

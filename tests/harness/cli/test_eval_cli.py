@@ -21,7 +21,6 @@ from command_line import robospa
 from numpy.typing import NDArray
 from run_fakes import FakePolicy, NanPolicy
 
-from robospa.harness.cli.main import main
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread
 from robospa.results.records.runs import finished, read_file, read_run
@@ -216,14 +215,11 @@ def test_a_torn_line_is_owed_again(tmp_path: Path) -> None:
     ],
 )
 def test_every_refusal_is_one_sentence_and_writes_nothing(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], sentence: str
+    tmp_path: Path, words: list[str], sentence: str
 ) -> None:
     out = tmp_path / "run"
-    with pytest.raises(SystemExit) as exit_code:
-        main(words_of(words[0], out, *words[1:]))
-    err = capsys.readouterr().err
-    assert exit_code.value.code == 1
-    assert sentence in err
+    code, _, err = robospa(*words_of(words[0], out, *words[1:]))
+    assert code == 1 and sentence in err
     assert len(err.strip().splitlines()) == 1
     assert not out.exists()
 

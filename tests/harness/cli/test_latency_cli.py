@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from command_line import robospa
 
-from robospa.harness.cli.main import main
 from robospa.harness.running import evaluate as running
 from robospa.harness.running.record_store import RecordWriter
 from robospa.harness.running.worker import Worker
@@ -57,18 +57,9 @@ def one_process(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(running, "probe_world", world)
 
 
-def run(words: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
-    with pytest.raises(SystemExit) as end:
-        main([*WORDS, *words])
-    out, err = capsys.readouterr()
-    return int(end.value.code or 0), out, err
-
-
-def test_one_command_gives_runs_a_table_and_a_figure(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_one_command_gives_runs_a_table_and_a_figure(tmp_path: Path) -> None:
     words = ["--latency", "0,120,240,480", "--out", str(tmp_path)]
-    code, out, err = run(words, capsys)
+    code, out, err = robospa(*WORDS, *words)
     assert code == 0, err
     assert "success against latency" in out and "alf of the success is gone at" in out
     manifest = json.loads((tmp_path / "240ms" / "run.json").read_text())
@@ -79,18 +70,16 @@ def test_one_command_gives_runs_a_table_and_a_figure(
     assert {p.suffix for p in tmp_path.glob("success-latency.*")} == {
         ".json", ".md", ".svg", ".png", ".pdf"
     }  # fmt: skip
-    code, out, _ = run([*words, "--resume", "--json"], capsys)
+    code, out, _ = robospa(*WORDS, *words, "--resume", "--json")
     assert code == 0 and json.loads(out)["points"] == data["points"]
 
 
 @pytest.mark.parametrize("latencies", ["0", "200,100", "0,x", "-5,10", "0,0"])
-def test_latencies_that_make_no_curve_are_refused(
-    latencies: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    code, _, err = run([f"--latency={latencies}", "--out", str(tmp_path)], capsys)
+def test_latencies_that_make_no_curve_are_refused(latencies: str, tmp_path: Path) -> None:
+    code, _, err = robospa(*WORDS, f"--latency={latencies}", "--out", tmp_path)
     assert code == 1 and "no growing milliseconds" in err
 
 
-def test_a_folder_is_needed(capsys: pytest.CaptureFixture[str]) -> None:
-    code, _, err = run(["--latency", "0,100"], capsys)
+def test_a_folder_is_needed() -> None:
+    code, _, err = robospa(*WORDS, "--latency", "0,100")
     assert code == 1 and "--out" in err

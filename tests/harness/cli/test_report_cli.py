@@ -9,7 +9,6 @@ import pytest
 from command_line import robospa
 from fake_runs import trial_record
 
-from robospa.harness.cli.main import main
 from robospa.results.records.runs import to_line
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
@@ -27,15 +26,10 @@ pytestmark = pytest.mark.usefixtures("same_figures_once")
         (["a", "b", "--audit"], "are of one run"),
     ],
 )
-def test_refusals(
-    words: list[str], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(SystemExit) as stop:
-        main(["report", *(str(tmp_path / w) if w in "ab" else w for w in words)])
-    assert stop.value.code == 1
-    error = capsys.readouterr().err
-    assert sentence in error
-    assert error.count("\n") == 1
+def test_refusals(words: list[str], sentence: str, tmp_path: Path) -> None:
+    done = robospa("report", *(tmp_path / w if w in "ab" else w for w in words))
+    assert done.code == 1 and sentence in done.err
+    assert done.err.count("\n") == 1
 
 
 LIFT = {"time": 3.0, "kind": "grasped", "object": "b", "index": -1, "note": "", "step": 4}
@@ -66,30 +60,21 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def printed(capsys: pytest.CaptureFixture[str], *words: str) -> str:
-    with pytest.raises(SystemExit) as end:
-        main(["report", *words, "--failures"])
-    out, err = capsys.readouterr()
-    return out if end.value.code == 0 else err
-
-
-def test_failures_are_counted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    out = printed(capsys, str(folder))
+def test_failures_are_counted(folder: Path) -> None:
+    out = robospa("report", folder, "--failures").out
     assert out.splitlines()[1].split() == ["Pick_Blocks_Size", "1", "1"]
     assert "1 failed trials of 3, 1 missing" in out
 
 
-def test_every_failed_trial_with_its_evidence(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (row,) = json.loads(printed(capsys, str(folder), "--trials", "--json"))
+def test_every_failed_trial_with_its_evidence(folder: Path) -> None:
+    (row,) = json.loads(robospa("report", folder, "--failures", "--trials", "--json").out)
     assert (row["seed"], row["type"], row["step"]) == (1, "target grounding", 4)
     assert (row["time"], row["video_seconds"]) == (3.0, 1.5)
     assert "took b" in row["evidence"]
 
 
-def test_an_unknown_grouping_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert "not by 'robot'" in printed(capsys, str(folder), "--by", "robot")
+def test_an_unknown_grouping_is_refused(folder: Path) -> None:
+    assert "not by 'robot'" in robospa("report", folder, "--failures", "--by", "robot").err
 
 
 def test_the_runs_of_a_folder_are_found(folder: Path) -> None:

@@ -15,8 +15,7 @@ from command_line import robospa
 from fake_runs import KNOWN, make_run, outcomes, write
 
 from robospa.clients import connect
-from robospa.harness.cli import main as cli
-from robospa.harness.cli.main import COMMANDS, command_of, main
+from robospa.harness.cli.main import COMMANDS, command_of
 from robospa.harness.official.checkout_world import CheckoutFinding
 from robospa.protocol.options import option
 from robospa.protocol.policy import PolicySpec, TrialInfo
@@ -76,16 +75,13 @@ def served(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 
 
 def run(*words: str) -> None:
-    with pytest.raises(SystemExit) as stop:
-        cli.main(["serve", *words])
-    assert not stop.value.code
+    assert robospa("serve", *words).code == 0
 
 
-def fails(capsys: pytest.CaptureFixture[str], *words: str) -> str:
-    with pytest.raises(SystemExit) as stop:
-        cli.main(["serve", *words])
-    assert stop.value.code
-    return capsys.readouterr().err
+def fails(*words: str) -> str:
+    done = robospa("serve", *words)
+    assert done.code
+    return done.err
 
 
 def test_options_are_typed_and_the_model_is_made_once(served: dict[str, Any]) -> None:
@@ -135,23 +131,20 @@ def test_a_plain_function_makes_one_policy_per_connection(served: dict[str, Any]
         (["untyped", "--option", "rows=1"], "unexpected keyword argument 'rows'"),
     ],
 )
-def test_options_that_cannot_be_are_named(
-    capsys: pytest.CaptureFixture[str], words: list[str], says: str
-) -> None:
-    assert says in fails(capsys, f"{__name__}:{words[0]}", *words[1:])
+def test_options_that_cannot_be_are_named(words: list[str], says: str) -> None:
+    assert says in fails(f"{__name__}:{words[0]}", *words[1:])
 
 
-def test_a_broken_options_file_is_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_broken_options_file_is_named(tmp_path: Path) -> None:
     file = tmp_path / "options.json"
     file.write_text("{")
-    assert "is no JSON" in fails(capsys, f"{__name__}:create", "--options", str(file))
+    assert "is no JSON" in fails(f"{__name__}:create", "--options", str(file))
     file.write_text("[]")
-    assert "one JSON object" in fails(capsys, f"{__name__}:create", "--options", str(file))
+    assert "one JSON object" in fails(f"{__name__}:create", "--options", str(file))
 
 
-def test_options_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
-    run(f"{__name__}:create", "--show-options")
-    assert capsys.readouterr().out.splitlines() == [
+def test_options_are_listed() -> None:
+    assert robospa("serve", f"{__name__}:create", "--show-options").out.splitlines() == [
         "path  where it is [text; default needed]",
         "rows  actions in a chunk [whole number; default 2]",
     ]
@@ -180,19 +173,15 @@ def test_the_example_with_options_is_served_as_printed(
 # ----------------------- `robospa view`: says where to look, ends when told, refuses what is no run
 
 
-def test_it_shows_a_run_for_a_while(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_it_shows_a_run_for_a_while(tmp_path: Path) -> None:
     folder = make_run(tmp_path / "run", KNOWN).folder
-    with pytest.raises(SystemExit) as stop:
-        main(["view", str(folder), "--minutes", "0.0001"])
-    assert not stop.value.code
-    assert "http://127.0.0.1:" in capsys.readouterr().out
+    done = robospa("view", folder, "--minutes", "0.0001")
+    assert done.code == 0 and "http://127.0.0.1:" in done.out
 
 
-def test_what_is_no_run_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as stop:
-        main(["view", str(tmp_path)])
-    assert stop.value.code == 1
-    assert "is not a run" in capsys.readouterr().err
+def test_what_is_no_run_is_one_sentence(tmp_path: Path) -> None:
+    done = robospa("view", tmp_path)
+    assert done.code == 1 and "is not a run" in done.err
 
 
 # -------------------------------- `robospa official checkout` from the command line: what it prints

@@ -18,7 +18,7 @@ from typer.testing import CliRunner, Result
 
 from robospa import extras
 from robospa.harness.cli import tasks as commands
-from robospa.harness.cli.main import COMMANDS, command_of, main
+from robospa.harness.cli.main import COMMANDS, command_of
 from robospa.harness.cli.tasks import describe_skill, tasks
 from robospa.harness.pictures import gallery
 from robospa.harness.seeds.attempt import Attempt
@@ -226,11 +226,9 @@ def test_no_flag_takes_every_number(name: str) -> None:
     assert made.callback(1) == 1
 
 
-def test_a_refusal_says_the_range(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as stop:
-        main(["check", "ws://127.0.0.1:9", "--timeout", "-5"])
-    assert stop.value.code == 2
-    assert "-5 is not from 0.001 to 604800" in capsys.readouterr().err
+def test_a_refusal_says_the_range() -> None:
+    done = robospa("check", "ws://127.0.0.1:9", "--timeout", "-5")
+    assert done.code == 2 and "-5 is not from 0.001 to 604800" in done.err
 
 
 # -------------------------------------------- `robospa seeds` from the command line: what it prints

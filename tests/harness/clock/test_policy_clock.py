@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from clock_fakes import TargetWorld, Walker
+from command_line import robospa
 from hypothesis import given
 from hypothesis import strategies as st
 from run_fakes import LIMIT, FakePolicy, parts
@@ -19,7 +20,6 @@ from wire_helpers import SPEC, Recall
 
 from robospa.clients import connect
 from robospa.harness import server_checks as module
-from robospa.harness.cli.main import main
 from robospa.harness.clock.policy_clock import (
     ClockError,
     Latency,
@@ -436,13 +436,12 @@ def test_a_server_that_goes_away_is_an_error_and_nobody_waits_for_ever() -> None
 
 
 def test_check_prints_the_clock_that_stands_for_the_server(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(module, "QUERIES", 3)
-    monkeypatch.setenv("COLUMNS", "200")
-    with ServerThread(policy_factory=lambda: Recall(SPEC)) as server, pytest.raises(SystemExit):
-        main(["check", server.url, "--trials", "0"])
-    lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
+    with ServerThread(policy_factory=lambda: Recall(SPEC)) as server:
+        done = robospa("check", server.url, "--trials", "0")
+    lines = [line.strip() for line in done.out.splitlines()]
     clocks = [line for line in lines if line.startswith("--clock real:")]
     assert len(clocks) == 3, "for one, four and eight robots"
     assert declared_latency(clocks[0].split()[1]) is not None

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_line import robospa
 
-from robospa.harness.cli.main import main
 from robospa.harness.convention_check.check import check_conventions
 from robospa.harness.convention_check.episodes import Episode, read_episode
 from robospa.harness.factory import policy_names
@@ -39,14 +39,11 @@ class ByHeart:
         return chunk
 
 
-def test_a_recorded_trial_is_a_demonstration(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_recorded_trial_is_a_demonstration(tmp_path: Path) -> None:
     file = tmp_path / "demo.hdf5"
-    words = ["collect", "--record", "Pick_Blocks_Size", "--out", str(file)]
-    with pytest.raises(SystemExit) as end:
-        main(words)
-    assert end.value.code == 0 and "success" in capsys.readouterr().out
+    words = ("collect", "--record", "Pick_Blocks_Size", "--out", file)
+    done = robospa(*words)
+    assert done.code == 0 and "success" in done.out
     made = read_episode(file)
     assert made.commanded.shape == (len(made), 14) and len(made) > 30
     arms = [c for c in range(14) if c not in (6, 13)]
@@ -58,6 +55,5 @@ def test_a_recorded_trial_is_a_demonstration(
     assert check_conventions(ByHeart(made, False), made, 3).kind == "fits"
     wrong = check_conventions(ByHeart(made, True), made, 4)
     assert wrong.best is not None and wrong.best.names == ("gripper inverted",)
-    with pytest.raises(SystemExit) as end:  # nothing is overwritten
-        main(words)
-    assert end.value.code == 1 and "exists already" in capsys.readouterr().err
+    done = robospa(*words)  # nothing is overwritten
+    assert done.code == 1 and "exists already" in done.err

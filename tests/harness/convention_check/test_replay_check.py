@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 import pytest
 import standins
+from command_line import robospa
 from replay_fakes import (
     CHUNK,
     EE,
@@ -29,7 +30,6 @@ from replay_fakes import (
 from robospa.action_space import ActionSpace
 from robospa.clients.state_encoding import poses_to_ee6d
 from robospa.geometry import Pose
-from robospa.harness.cli.main import main
 from robospa.harness.convention_check.check import Findings, absolute, check_conventions
 from robospa.harness.convention_check.episodes import (
     EpisodeError,
@@ -103,11 +103,6 @@ def test_a_mistake_in_the_answer_is_named(name: str) -> None:
 def test_and_through_noise(name: str) -> None:
     findings = found(Learned(MADE, ANSWERS[name], noise=0.02))
     assert findings.best is not None and findings.best.names == (name,)
-
-
-def test_openpi_is_named_with_its_signs() -> None:
-    findings = found(Learned(MADE, ANSWERS["joint signs"]))
-    assert "adapt_to_pi" in findings.sentence
 
 
 LOOKS = {
@@ -464,15 +459,13 @@ def xvla(seen: Any) -> Any:
     return chunk
 
 
-def check(url: str, demo: Path, capsys: pytest.CaptureFixture[str]) -> tuple[int, str]:
-    with pytest.raises(SystemExit) as end:
-        main(["check", url, "--trials", "0", "--load-seconds", "0", "--demo", str(demo)])
-    return int(end.value.code or 0), " ".join(capsys.readouterr().out.split())
+def check(url: str, demo: Path) -> tuple[int, str]:
+    done = robospa("check", url, "--trials", "0", "--load-seconds", "0", "--demo", demo)
+    return done.code, " ".join(done.out.split())
 
 
 @pytest.fixture
-def demo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("COLUMNS", "240")
+def demo(tmp_path: Path) -> Path:
     write_episode(tmp_path / "demo.hdf5", MADE)
     return tmp_path / "demo.hdf5"
 
@@ -492,11 +485,10 @@ def test_the_replay_names_the_option(
     option: str,
     right: str | None,
     demo: Path,
-    capsys: pytest.CaptureFixture[str],
 ) -> None:
     with stand_in(server)(model) as url:
-        code, out = check(url, demo, capsys)
+        code, out = check(url, demo)
         assert code == 1 and told in out and option in out, out
         if right is not None:
-            code, out = check(url + right, demo, capsys)
+            code, out = check(url + right, demo)
             assert code == 0 and "It fits the demonstration" in out, out

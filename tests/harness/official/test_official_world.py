@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 from checkouts import TEMPLATES, write_checkout
+from command_line import robospa
 from made_archive import make_archive, official_pack_in
 
 from robospa.baselines.oracle import create
 from robospa.geometry import Pose
-from robospa.harness.cli.main import main
 from robospa.harness.official import official_world
 from robospa.harness.official.layout import (
     BUILTIN_SUITE,
@@ -323,12 +323,8 @@ def test_the_overlap_counts_equal_and_alike_templates() -> None:
     assert found.examples == ("lift  the cup.",)
 
 
-def request_sentences(folder: Path, **more: object):  # type: ignore[no-untyped-def]
-    given = {
-        "policy": ["hold"], "tasks": "Rank_Blocks_Color", "levels": "2", "trials": 1,
-        "instructions": str(folder), "out": folder / "run", **more,
-    }  # fmt: skip
-    return make_request(updated(EvaluationSettings(), given))
+def request_sentences(folder: Path, **more: object) -> Any:
+    return request(folder, world="sapien", trials=1, instructions=str(folder), **more)
 
 
 def test_a_run_has_official_splits_sentences_and_their_hash(
@@ -362,15 +358,10 @@ def test_official_splits_are_none_of_ours(tmp_path: Path) -> None:
         request_sentences(tmp_path, parts="run_fakes:parts")
 
 
-def test_the_command_shows_what_fits_and_what_is_trained_on(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    write_checkout(tmp_path)
-    with pytest.raises(SystemExit) as ended:
-        main(["official", "instructions", str(tmp_path), "--tasks", "Rank_Blocks_Color",
-              "--levels", "2"])  # fmt: skip
-    shown = capsys.readouterr().out
-    assert ended.value.code == 0
+def test_the_command_shows_what_fits_and_what_is_trained_on(tmp_path: Path) -> None:
+    words = ("--tasks", "Rank_Blocks_Color", "--levels", "2")
+    code, shown, _ = robospa("official", "instructions", write_checkout(tmp_path), *words)
+    assert code == 0
     assert "Rank_Blocks_Color 2: fit 1 of 1, 1 of 1; 0 equal, 0 alike of 1" in shown
     assert "sort this pair by hue, red first" in shown
 

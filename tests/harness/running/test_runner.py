@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_line import robospa
 from numpy.typing import NDArray
 from run_fakes import SPEC, FakePolicy
 
-from robospa.harness.cli.main import main
 from robospa.harness.running.executor import RunAborted
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
@@ -237,10 +237,8 @@ def run(command: list[str]) -> str:
     return err
 
 
-def refused(command: list[str], capsys: pytest.CaptureFixture[str]) -> str:
-    with pytest.raises(SystemExit):
-        main(command)
-    err = capsys.readouterr().err
+def refused(command: list[str]) -> str:
+    err = robospa(*command).err
     assert len(err.strip().splitlines()) == 1
     return err
 
@@ -281,17 +279,15 @@ def test_a_server_that_dies_leaves_its_trials_to_the_other(tmp_path: Path) -> No
     assert lost <= {r.key for r in results if r.retries}
 
 
-def test_servers_with_different_specs_are_not_one_policy(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_servers_with_different_specs_are_not_one_policy(tmp_path: Path) -> None:
     with Site("one") as first, Site("two", execute=3) as second:
         command = words(tmp_path / "run", first.url, "--policy", second.url)
-        err = refused(command, capsys)
+        err = refused(command)
         assert f"{first.url} and {second.url} are not the same" in err
         assert "spec.execute is None and 3; spec.name is 'one' and 'two'" in err
         path = tmp_path / "map.json"
         path.write_text(json.dumps({task: [first.url, second.url] for task in TASKS}))
-        err = refused(words(tmp_path / "run", "--policy-map", str(path)), capsys)
+        err = refused(words(tmp_path / "run", "--policy-map", str(path)))
         assert f"{second.url} of {TASKS[0]} are not the same" in err
     assert not (tmp_path / "run").exists()
 

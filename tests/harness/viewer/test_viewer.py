@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_line import robospa
 from fake_runs import KNOWN, make_run, trial_record
 from film_fakes import KEYS, recorded
 from run_fakes import FakeWorld, parts
 
 from robospa.geometry import Pose
-from robospa.harness.cli.main import main
 from robospa.harness.replay import ReplayError
 from robospa.harness.robots import embodiment
 from robospa.harness.running.manifest import this_processor, write_manifest
@@ -311,19 +311,13 @@ def test_a_trial_goes_by_the_beginning_of_its_name(tmp_path: Path) -> None:
     ],
 )
 def test_flags_that_do_not_go_together_are_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], sentence: str
+    tmp_path: Path, words: list[str], sentence: str
 ) -> None:
-    with pytest.raises(SystemExit) as stop:
-        main([str(tmp_path) if word == "RUN" else word for word in words])
-    assert stop.value.code == 2
-    assert sentence in capsys.readouterr().err
+    done = robospa(*(tmp_path if word == "RUN" else word for word in words))
+    assert done.code == 2 and sentence in done.err
 
 
 @pytest.mark.skipif(find_spec("viser") is not None, reason="viser is installed here")
-def test_without_viser_its_extra_is_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(SystemExit) as stop:
-        main(["view", str(make_run(tmp_path / "run", KNOWN).folder), SLUG])
-    assert stop.value.code == 1
-    assert "[view]'" in capsys.readouterr().err
+def test_without_viser_its_extra_is_named(tmp_path: Path) -> None:
+    done = robospa("view", make_run(tmp_path / "run", KNOWN).folder, SLUG)
+    assert done.code == 1 and "[view]'" in done.err
