@@ -10,10 +10,12 @@ chunks, reconnecting between trials) is the same for all.
 
 import ssl as ssl_module
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 from urllib.parse import urlsplit
 
 from robospa.clients.dialect import (
+    REFUSED,
     TLS_PORT,
     ConnectionParams,
     Dialect,
@@ -29,6 +31,8 @@ from robospa.protocol.transport import Timeouts
 __all__ = ["check_options", "connect", "find_endpoint"]
 
 
+PATIENCE = 4.0
+"""[s] that a server may be silent before it is asked which dialect it speaks."""
 TOKEN = "give the server's token with --token, ROBOSPA_TOKEN or token=, which is written nowhere"
 
 
@@ -43,6 +47,8 @@ def find_endpoint(url: str, options: Mapping[str, object] | None = None) -> Endp
         raise ValueError(f"{shown!r} holds a user or password, which is never used: {TOKEN}")
     by_scheme = {scheme: dialect for dialect in dialects() for scheme in dialect.schemes}
     dialect = by_scheme.get(parts.scheme)
+    if parts.scheme in REFUSED:
+        raise ValueError(f"{shown!r}: {REFUSED[parts.scheme]}")
     if dialect is None:
         raise ValueError(f"{shown!r} is no address of a policy server; {_addresses(by_scheme)}")
     if not parts.hostname:
@@ -114,21 +120,31 @@ def connect(
     endpoint, chosen = _prepare(url, options)
     params = ConnectionParams(endpoint, timeouts or Timeouts(), token=token, ssl=ssl)
     known = identity is not None
+    # A silent server is first given a short time: if it then looks like one of another dialect,
+    # nobody waits for minutes.
+    hello, handshake = min(PATIENCE, params.timeouts.hello), min(PATIENCE, params.timeouts.connect)
+    brief = replace(params, timeouts=replace(params.timeouts, hello=hello, connect=handshake))
+    if endpoint.dialect.wire != "websocket":
+        brief = params
 
     def opened() -> WireClient:
         nonlocal known
         try:
-            session = endpoint.dialect.open_session(params, chosen)
-            known = True
-            if params.redirects:
-                session.hello["redirected_to"] = params.redirects[-1]
-            return session
+            session = endpoint.dialect.open_session(params if known else brief, chosen)
         except errors.Unauthorized as error:
             raise errors.Unauthorized(f"{error}; {TOKEN}") from error.__cause__
         except (errors.HandshakeError, errors.TransportError, errors.ServerError) as error:
             # Once it has spoken this dialect, trouble is trouble and no sign of another one.
             if known or isinstance(error.__cause__, ConnectionRefusedError):
                 raise
-            raise explain_error(error, params) from error.__cause__
+            explained = explain_error(error, params)
+            silent = explained is error and isinstance(error.__cause__, TimeoutError)
+            if not silent or brief.timeouts == params.timeouts:
+                raise explained from error.__cause__
+            session = endpoint.dialect.open_session(params, chosen)
+        known = True
+        if params.redirects:
+            session.hello["redirected_to"] = params.redirects[-1]
+        return session
 
     return RemotePolicy(url, opened, params.timeouts, identity)

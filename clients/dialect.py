@@ -13,6 +13,7 @@ from __future__ import annotations
 import contextlib
 import http.client
 import json
+import socket
 import ssl as ssl_module
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -45,6 +46,7 @@ class Dialect:
     open_session: connects and greets; raises the errors of `robospa.protocol.errors`.
     recognise: whether a server speaks this dialect, by a few harmless questions that run no model.
     weak_sign: whether other servers may pass `recognise` too, so that it is asked after the others.
+    sign: by what `recognise` knows it, completes "because".
     also_reaches: schemes of other dialects whose servers this one gets on with.
     deciding_options: for mistakes that `robospa check --demo` names, the option that decides them.
     shared_state: whether one model keeps one state for all connections, so that two trials at once
@@ -60,6 +62,7 @@ class Dialect:
     secure_scheme: str = ""
     recognise: Callable[[Probe], bool] | None = None
     weak_sign: bool = False
+    sign: str = ""
     also_reaches: tuple[str, ...] = ()
     deciding_options: Mapping[str, str] = field(default_factory=dict)
     shared_state: bool = False
@@ -221,6 +224,16 @@ class Probe:
 SECONDS = 1.5
 """Deadline of each question."""
 SMALL = Limits(message=2**22)
+UNPICKLES = (
+    "{} unpickles what it receives, so that whoever reaches it can run code there: robospa does "
+    "not speak to it; serve the checkpoint by {} instead"
+)
+LEROBOT = UNPICKLES.format("LeRobot's asynchronous inference server", "`robospa serve lerobot`")
+BEING_H = UNPICKLES.format("Being-H's server", "XPolicyLab's Being_H05")
+REFUSED = {"grpc": LEROBOT, "lerobot": LEROBOT, "being-h": BEING_H}
+"""Schemes under which servers may be looked for that are never spoken to, and why."""
+HTTP2 = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes((0, 0, 0, 4, 0, 0, 0, 0, 0))
+"""How a client of gRPC begins: the preface, and settings that change nothing."""
 WEBSOCKET = "a WebSocket server"
 HTTP = "an HTTP server of another kind"
 
@@ -234,7 +247,8 @@ def explain_error(error: WireError, params: ConnectionParams) -> WireError:
     advice = ""
     if isinstance(found, Dialect):
         scheme = found.secure_scheme if endpoint.secure and found.secure_scheme else found.scheme
-        advice = f"; try {scheme}://{endpoint.authority}"
+        why = f", because {found.sign}" if found.sign else ""
+        advice = f"; try {scheme}://{endpoint.authority}{why}"
     server = found if isinstance(found, str) else found.server
     explanation = HandshakeError(f"{endpoint.url} looks like {server}{advice} ({error})")
     explanation.__cause__ = error
@@ -264,8 +278,24 @@ def detect(params: ConnectionParams) -> Dialect | str | None:
                 if dialect.recognise(probe):
                     return dialect
     if status is None:
-        return None
+        return _refused(probe)
     return WEBSOCKET if status == 426 or _opens_websocket(probe.params) else HTTP
+
+
+def _refused(probe: Probe) -> str | None:
+    """What a server without HTTP/1 shows: gRPC answers settings, ZeroMQ greets unasked."""
+    endpoint = probe.params.endpoint
+    try:
+        with socket.create_connection((endpoint.host, endpoint.port), SECONDS) as sock:
+            sock.settimeout(SECONDS)
+            sock.sendall(HTTP2)
+            first = sock.recv(10)
+    except OSError:
+        return None
+    if first[3:5] == b"\x04\x00":
+        return f"a gRPC server; {LEROBOT}"
+    is_zmq = first[:1] == b"\xff" and first[9:10] == b"\x7f"
+    return f"a ZeroMQ server of another kind; {BEING_H}" if is_zmq else None
 
 
 def _opens_websocket(params: ConnectionParams) -> bool:

@@ -106,6 +106,7 @@ DIALECT = Dialect(
     options=Go1ClientOptions,
     open_session=Go1Session,
     recognise=recognise,
+    sign="it answers an empty question with a bare HTTP 500",
     weak_sign=True,
     deciding_options={
         "wrist images swapped": "wrists",

@@ -314,5 +314,6 @@ DIALECT = Dialect(
     options=RoboTwinClientOptions,
     open_session=RoboTwinSession,
     recognise=recognise,
+    sign="it answers a framed command without a name with an error",
     shared_state=True,
 )

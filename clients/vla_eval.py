@@ -211,6 +211,7 @@ DIALECT = Dialect(
     options=VlaEvalClientOptions,
     open_session=VlaEvalSession,
     recognise=recognise,
+    sign="its /health answers status ok",
     deciding_options={
         "gripper inverted": "grippers",
     },

@@ -331,6 +331,7 @@ DIALECT = Dialect(
     options=XPolicyLabClientOptions,
     open_session=XPolicyLabSession,
     recognise=recognise,
+    sign="it answers XPolicyLab's hello",
     shared_state=True,
     deciding_options={
         "measured state": "state",

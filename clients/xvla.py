@@ -220,6 +220,7 @@ DIALECT = Dialect(
     options=XvlaClientOptions,
     open_session=XvlaSession,
     recognise=recognise,
+    sign="it answers a question without pictures with HTTP 400 and an `error`",
     deciding_options={
         "blue for red": "colors",
         "quaternion x y z w": "quaternions",

@@ -157,7 +157,7 @@ class Connection:
     wait: Pause = option(0.0, "seconds to wait at the start for the server to listen")
     patience: Pause = option(60.0, "seconds that a worker waits for a server that went away")
     client: Path | None = option(
-        None, "JSON file with options of the server's dialect; those in the URL win"
+        None, "TOML or JSON file with options of its dialect; those in the URL win"
     )
     trials_per_worker: Annotated[int, Meta(ge=0, le=MOST_HELD)] = option(
         0,

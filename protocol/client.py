@@ -80,13 +80,14 @@ class Identity:
     @property
     def checkpoint(self) -> str:
         """What the server says of its checkpoint; empty if nothing names one."""
-        for name, value in (
-            ("spec.checkpoint", self.parts.get("spec.checkpoint")),
-            *self.own_parts(),
-        ):
+        return next((str(value)[:SHOWN] for _, value in self.checkpoints()), "")
+
+    def checkpoints(self) -> Iterator[tuple[str, object]]:
+        """The parts that name its checkpoint, as its spec does or by a name of its own."""
+        spec = ("spec.checkpoint", self.parts.get("spec.checkpoint"))
+        for name, value in (spec, *self.own_parts()):
             if isinstance(value, (str, int)) and value != "" and _speaks_of(CHECKPOINT, name):
-                return str(value)[:SHOWN]
-        return ""
+                yield name, value
 
     def own_parts(self) -> Iterator[tuple[str, object]]:
         """The parts that are a server's own, by name."""

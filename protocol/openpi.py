@@ -1,7 +1,7 @@
-"""openpi's dialect: its observations, both ways, and the conversation of our server with a client.
+"""openpi's dialect at our server: its clients' observations, and the conversation with one.
 
-A client that offers no subprotocol is openpi's. The client to openpi's own server and the server of
-its models (`robospa.clients.openpi`) take their names and layouts from here.
+A client that offers no subprotocol is openpi's. Our client to servers of this kind is
+`robospa.clients.openpi_family`, which takes the names of the cameras from here.
 
     ours                openpi (Aloha)
     images.head         images.cam_high            uint8 (3, H, W) RGB; read too: (H, W, 3), or 0..1
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from robospa.observation import Observation
 from robospa.protocol.codec import Limits, decode, encode
 from robospa.protocol.connection_limits import MonitoredConnection
-from robospa.protocol.errors import DecodeError, EncodeError, error_sentence, policy_traceback
+from robospa.protocol.errors import DecodeError, error_sentence, policy_traceback
 from robospa.protocol.messages import VERSION
 from robospa.protocol.policy import (
     PolicySpec,
@@ -42,33 +42,6 @@ CAMERA_NAMES = {
     "front": "cam_low",
 }
 """Our camera names and those of openpi's Aloha configurations."""
-
-
-def to_openpi(
-    observation: Observation,
-    cameras: Mapping[str, str] = CAMERA_NAMES,
-    extra: Mapping[str, object] | None = None,
-    committed: tuple[str, str] | None = None,
-) -> dict[str, object]:
-    """Our observation as an openpi Aloha observation, `extra` beside it at the top level.
-
-    `cameras` maps our names to the server's; raises EncodeError for a camera that it lacks.
-    `committed` are its names of the committed actions, sent as float64 (n, D), and of the delay.
-    """
-    images = {}
-    for name, image in observation.get("images", {}).items():
-        if name not in cameras:
-            known = ", ".join(cameras)
-            raise EncodeError(f"camera {name!r} has no openpi name; cameras with one: {known}")
-        images[cameras[name]] = np.moveaxis(image, -1, 0)
-    sent = {**(extra or {}), "images": images, "prompt": observation.get("instruction", "")}
-    if "state" in observation:
-        sent["state"] = np.asarray(observation["state"], np.float64)
-    if committed is not None and "committed" in observation:
-        rows, delay = committed
-        sent[rows] = np.asarray(observation["committed"], np.float64)
-        sent[delay] = observation["delay"]
-    return sent
 
 
 def from_openpi(value: object, step: int, spec: PolicySpec) -> Observation:

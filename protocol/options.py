@@ -170,6 +170,7 @@ def _type_name(hint: Any) -> str:
         str: "text",
         Path: "path",
         tuple[str, ...]: "list of texts",
+        tuple[int, ...]: "list of whole numbers",
     }
     kinds = [k for k in _alternatives(hint) if k is not type(None)]
     return " or ".join(names.get(kind, str(kind)) for kind in kinds)

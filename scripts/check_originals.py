@@ -4,7 +4,8 @@
 
 PYTHON has openpi-client, vla-eval, fastapi, uvicorn, json_numpy, msgpack-numpy, requests, scipy,
 opencv-python-headless, einops, tqdm. CHECKOUTS is a folder with openpi, AgiBot-World, X-VLA,
-XPolicyLab, RoboTwin (the parent of its commit 85c7f84) and RoboTwin-main. In every case the
+XPolicyLab, RoboTwin (the parent of its commit 85c7f84), RoboTwin-main, starVLA, lingbot-vla and
+vllm-omni (a wheel unpacked). In every case the
 original server runs its own code with a model that reports what it reads; it is asked by the
 original client and by ours, with the same observations. Prints the table of docs/clients.md, and
 ends with 1 if an action differs. Not part of the tests, because it needs all that.
@@ -83,6 +84,27 @@ CASES = {
         "openpi",
         "openpi",
         steps=(0,),
+    ),
+    "starvla": Case(
+        "StarVLA: `WebsocketPolicyServer`; its client of RoboTwin",
+        "family.py",
+        "starVLA",
+        "starvla",
+        words=("starvla",),
+    ),
+    "vllm": Case(
+        "vLLM-Omni: its robot endpoint; `openpi_client` with the checkpoint's names",
+        "family.py",
+        "vllm-omni",
+        "vllm",
+        words=("vllm",),
+    ),
+    "lingbot": Case(
+        "LingBot-VLA: `WebsocketPolicyServer`; its client with the names that its policy reads",
+        "family.py",
+        "lingbot-vla",
+        "lingbot",
+        words=("lingbot",),
     ),
     "go1": Case(
         "GO-1: `deploy.py`; RoboTwin's client (`wrists=swapped`)",

@@ -25,6 +25,7 @@ from robospa.text import plain_console
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from robospa.clients.dialect import Dialect
     from robospa.harness.convention_check.check import Findings
     from robospa.harness.convention_check.episodes import Episode
     from robospa.harness.official.recordings import RecordingReplay
@@ -61,7 +62,7 @@ def check(
     ] = ANSWER_SECONDS,
     client: Annotated[
         Path | None,
-        typer.Option(help="JSON file with options of the server's dialect; those in the URL win"),
+        typer.Option(help="TOML or JSON file with options of its dialect; those in the URL win"),
     ] = None,
     demo: Annotated[
         Path | None,
@@ -205,7 +206,9 @@ def measured(console: Console, target: Target, seconds: float) -> list[Load]:
     with target.connect() as policy:
         if policy.spec.privileged:
             return []
-    loads = measure(target.connect, seconds, CLIENTS[:1] if target.shared_state else CLIENTS)
+    loads = measure(
+        target.connect, seconds, CLIENTS[:1] if target.dialect.shared_state else CLIENTS
+    )
     table = Table("clients", "answers/s", "p5", "p50", "p95", "most [ms]", box=None)
     for load in loads:
         shown = [f"{load.latency.at(share):.1f}" for share in (0.05, 0.5, 0.95, 1.0)]
@@ -230,10 +233,7 @@ class Target:
     token: str | None
     timeouts: Timeouts
     connect: Connect
-    deciding_options: Mapping[str, str]
-    """Mistakes that a demonstration may show, to the option of the dialect that decides them."""
-    shared_state: bool = False
-    """Whether its model keeps one state for all connections."""
+    dialect: Dialect
 
 
 def target_of(
@@ -264,8 +264,7 @@ def target_of(
         token,
         limits,
         connector,
-        dialect.deciding_options,
-        dialect.shared_state,
+        dialect,
     )
 
 
@@ -290,8 +289,11 @@ def _run_checks(console: Console, target: Target, trials: int) -> list[CheckResu
         target.token,
         timeouts=target.timeouts,
         connector=target.connect,
-        shared_state=target.shared_state,
+        shared_state=target.dialect.shared_state,
     )
+    if results[0].passed and target.dialect.sign:
+        detail = f"{results[0].detail}, because {target.dialect.sign}"
+        results[0] = replace(results[0], detail=detail)
     failed = {result.name for result in results if result.passed is False}
     if not failed & {"handshake", "actions"}:
         results.append(_first_actions(target.connect))
@@ -344,7 +346,7 @@ def _replay(console: Console, target: Target, episode: Episode, points: int) -> 
         findings = check_conventions(policy, episode, points)
         chosen = policy.hello.get("options")  # a robospa.v1 server leaves nothing to choose
     known = chosen if isinstance(chosen, Mapping) else {}
-    options = {m: name for m, name in target.deciding_options.items() if name in known}
+    options = {m: name for m, name in target.dialect.deciding_options.items() if name in known}
     show(console, findings, episode.name, options)
     return findings
 

@@ -19,7 +19,9 @@ from robospa.harness.factory import is_url, open_policy
 from robospa.harness.robots import embodiment
 from robospa.observation import CAMERAS
 from robospa.protocol.client import Identity, identity_of
-from robospa.protocol.policy import CALLED, POINT, PolicySpec, has
+from robospa.protocol.conformance import synthetic_observation, trial_for
+from robospa.protocol.errors import PolicyError, TransportError
+from robospa.protocol.policy import CALLED, POINT, Policy, PolicySpec, has
 from robospa.results.records.manifest import PolicySettings, RunError
 from robospa.schema import parse_json
 from robospa.tasks.catalog import task as find_task
@@ -97,7 +99,8 @@ def probe(
     """The policy at `target`, after at most `wait` s of nobody listening; `look`: at its first
     actions, too. One that does not answer says so in its trials.
 
-    Raises what connecting raises.
+    Raises what connecting raises, and RunError if a server of another project answers an error: its
+    names or shapes are not those that its dialect's options say.
     """
     options = dict(given)
     if "timeouts" in options:
@@ -105,14 +108,31 @@ def probe(
     policy = open_policy(target, options)
     hello = dict(policy.hello) if has(policy, "hello") else {"dialect": "in process"}
     hints: list[str] = []
-    if look:
-        from robospa.harness.convention_check import initial_actions
+    try:
+        if look:
+            from robospa.harness.convention_check import initial_actions
 
-        with suppress(Exception):
-            hints, _ = initial_actions.hints(policy)
-    if has(policy, "close"):
-        policy.close()
+            if hello["dialect"] not in ("in process", "robospa.v1"):
+                _ask_once(policy, target)
+            with suppress(Exception):
+                hints, _ = initial_actions.hints(policy)
+    finally:
+        if has(policy, "close"):
+            policy.close()
     return ProbedPolicy(target, policy.spec, hello, hints=tuple(hints))
+
+
+def _ask_once(policy: Policy, target: str) -> None:
+    trial, seen = trial_for(policy.spec), synthetic_observation(policy.spec)
+    with suppress(TransportError):
+        try:
+            policy.reset(trial)
+            policy.infer(seen)
+        except PolicyError as error:
+            raise RunError(
+                f"{target} cannot answer an observation of this form, and no trial was begun: "
+                f"{error}; see the options of its dialect in docs/clients.md"
+            ) from error
 
 
 def probe_policies(
@@ -157,9 +177,9 @@ def without_volatile(
 def combine_replicas(servers: Sequence[ProbedPolicy], task: str = "") -> ProbedPolicy:
     """The first of `servers` with the others as replicas; raises RunError if one differs."""
     first, *others = servers
-    expected = _flat(first.settings())
+    expected = _flat(first)
     for other in others:
-        found = _flat(other.settings())
+        found = _flat(other)
         changes = [
             f"{name} is {expected.get(name, 'unset')!r} and {found.get(name, 'unset')!r}"
             for name in sorted({*expected, *found})
@@ -175,10 +195,13 @@ def combine_replicas(servers: Sequence[ProbedPolicy], task: str = "") -> ProbedP
     return replace(first, replicas=tuple(others))
 
 
-def _flat(settings: PolicySettings) -> dict[str, object]:
-    """Settings by dotted name, without what may differ: how many observations one call holds."""
+def _flat(policy: ProbedPolicy) -> dict[str, object]:
+    """Settings and what names its checkpoint, by dotted name, without what may differ: how many
+    observations one call holds."""
+    settings = policy.settings()
     spec = {f"spec.{name}": v for name, v in settings.spec.items() if name != "batch"}
-    return {"dialect": settings.dialect, "options": settings.options, **spec}
+    told = {"dialect": settings.dialect, "options": settings.options}
+    return {**dict(policy.identity.checkpoints()), **told, **spec}
 
 
 def check_fit(policy: ProbedPolicy, keys: Sequence[TrialKey]) -> None:

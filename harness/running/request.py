@@ -2,6 +2,7 @@
 
 import secrets
 import time
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -166,12 +167,14 @@ def connect_arguments(
 
 
 def client_options(url: str, file: Path | None) -> dict[str, Any]:
-    """The options of the JSON `file`, checked with those of the URL; raises SettingsError."""
+    """The options of the TOML or JSON `file`, checked with those of the URL; raises
+    SettingsError."""
     from robospa.clients import check_options
     from robospa.schema import parse_json
 
     try:
-        given = parse_json(file.read_text()) if file is not None else {}
+        read = tomllib.loads if file is not None and file.suffix == ".toml" else parse_json
+        given = read(file.read_text()) if file is not None else {}
         if not isinstance(given, dict):
             raise ValueError("it is no JSON map")
         check_options(url, given)

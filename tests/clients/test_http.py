@@ -3,7 +3,9 @@
 import contextlib
 import itertools
 import socket
+import socketserver
 import threading
+import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import fields, replace
@@ -188,7 +190,11 @@ def table_of(dialect: Dialect) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("dialect", [d for d in DIALECTS if d.scheme != "ws"], ids=by_scheme)
+PRESETS = ("ws", "starvla", "vllm", "lingbot")
+"""Those with the options of openpi; the defaults of presets are in presets.json."""
+
+
+@pytest.mark.parametrize("dialect", [d for d in DIALECTS if d.scheme not in PRESETS], ids=by_scheme)
 def test_a_page_lists_every_option(dialect: Dialect) -> None:
     """Those of nearly all dialects in the first table of clients.md, its own in a table."""
     head = "| option | default | values | meaning |\n|---|---|---|---|\n"
@@ -222,6 +228,39 @@ def test_the_scheme_chooses_the_dialect(scheme: str, dialect: str) -> None:
     else:
         assert (spec.horizon, spec.text_budget) == (None, 150)
         assert [camera.name for camera in spec.cameras] == ["head", "left_wrist", "right_wrist"]
+
+
+@pytest.mark.parametrize("url", ["grpc://gpu:8080", "lerobot://gpu", "being-h://gpu:5555"])
+def test_servers_that_unpickle_are_refused_by_name(url: str) -> None:
+    with pytest.raises(ValueError, match=r"unpickles what it receives.*instead$"):
+        connect(url)
+
+
+@pytest.mark.parametrize(
+    ("first", "name"),
+    [
+        (bytes((0, 0, 6, 4, 0, 0, 0, 0, 0, 0, 3, 0, 0, 0, 1)), "a gRPC server; LeRobot's"),
+        (b"\xff" + bytes(8) + b"\x7f", "a ZeroMQ server of another kind; Being-H's"),
+    ],
+)
+def test_a_server_without_http_is_recognised_by_its_first_bytes(
+    first: bytes, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("robospa.clients.dialect.SECONDS", 0.2)
+    monkeypatch.setattr("robospa.clients.PATIENCE", 0.2)
+
+    class Greets(socketserver.BaseRequestHandler):
+        def handle(self) -> None:
+            self.request.sendall(first)
+            self.request.recv(1000)
+            time.sleep(1.0)
+
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Greets) as server:
+        server.daemon_threads = True
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        with pytest.raises(HandshakeError, match=f"looks like {name}"):
+            connect(f"ws://127.0.0.1:{server.server_address[1]}")
+        server.shutdown()
 
 
 @pytest.mark.parametrize("url", ["http://localhost:8000", "localhost:8000", "oracle", ""])

@@ -1,6 +1,7 @@
 """A server of openpi's form, and our client."""
 
 import sys
+import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -27,7 +28,9 @@ from standins import (
 
 from robospa.action_space import ActionSpace
 from robospa.clients import connect, openpi
-from robospa.clients.openpi import OpenPiClientOptions
+from robospa.clients.openpi_family import FamilyOptions
+from robospa.harness.running.policy_probe import probe
+from robospa.harness.running.request import client_options
 from robospa.protocol.errors import (
     ConnectionLost,
     EncodeError,
@@ -35,7 +38,8 @@ from robospa.protocol.errors import (
     ProtocolViolation,
     ServerError,
 )
-from robospa.protocol.openpi import CAMERA_NAMES, to_openpi
+from robospa.protocol.openpi import CAMERA_NAMES
+from robospa.results.records.manifest import RunError
 
 
 def reply(actions: Any) -> bytes:
@@ -125,16 +129,16 @@ def test_openpi_other_cameras_names_and_keys() -> None:
 
 
 def test_committed_actions_go_under_the_names_of_the_server() -> None:
-    options = OpenPiClientOptions(committed="prev_chunk_left_over,inference_delay")
-    assert options.spec.committed_actions and not OpenPiClientOptions().spec.committed_actions
+    options = FamilyOptions(committed="prev_chunk_left_over,inference_delay")
+    assert options.spec("x").committed_actions and not FamilyOptions().spec("x").committed_actions
     rows = np.ones((3, 14), np.float32)
     seen: Any = {"instruction": "go", "committed": rows, "delay": 2}
-    sent = to_openpi(seen, {}, {}, options.committed_names)
+    sent = options.request(seen)
     assert sent["inference_delay"] == 2
     assert np.array_equal(np.asarray(sent["prev_chunk_left_over"]), rows)
-    assert set(to_openpi(seen, {}, {})) == {"images", "prompt"}
+    assert set(FamilyOptions().request(seen)) == {"images", "prompt"}
     with pytest.raises(ValueError, match="is not two names"):
-        OpenPiClientOptions(committed="prefix")
+        FamilyOptions(committed="prefix")
 
 
 def test_openpis_own_codec_reads_and_is_read() -> None:
@@ -335,7 +339,7 @@ def test_the_names_read_at_training_are_those_sent_at_evaluation(configs: dict[s
         "state": np.zeros(ActionSpace("joint").width),
         "instruction": "Go.",
     }
-    sent = to_openpi(observation, CAMERA_NAMES, {})
+    sent = FamilyOptions().request(observation)
     assert set(structure) == {*sent, "actions"}
     assert set(structure["images"]) == set(sent["images"])  # type: ignore[call-overload]
     assert structure["images"]["cam_left_wrist"] == "observation.images.left_wrist"
@@ -362,3 +366,101 @@ def test_a_script_of_openpi_finds_the_configurations_that_it_is_given(
     out = tmp_path / "out"
     openpi.main([str(script), "pi05_robospa_a", "--policy.config=pi05_lora_robospa_b", str(out)])
     assert out.read_text() == "__main__ pi05_lora_robospa_b pi05_robospa_a"
+
+
+class Preset(OpenPi):
+    """A server of the family: greets with `metadata`, answers `answers` one after another."""
+
+    def __init__(self, scheme: str, metadata: Any, *answers: Any) -> None:
+        super().__init__()
+        self.scheme, self.metadata, self.answers = scheme, metadata, answers  # type: ignore[misc]
+
+    def talk(self, socket: Any) -> None:
+        socket.send(msgpack.packb(self.metadata, default=OPENPI.write))
+        for answer in self.answers:
+            self.requests.append(
+                msgpack.unpackb(socket.recv(), object_hook=OPENPI.read, strict_map_key=False)
+            )
+            socket.send(msgpack.packb(answer, default=OPENPI.write))
+        socket.recv()
+
+
+STARVLA = {"env": "starvla_policy_server", "ckpt_path": "1.pt"}
+
+
+def test_starvla_is_asked_and_read_in_its_own_order() -> None:
+    chunk = np.arange(28.0).reshape(1, 2, 14)
+    server = Preset("starvla", STARVLA, {"status": "ok", "data": {"actions": chunk}})
+    found = answered(server, "?joints=state[]")
+    assert found[0].tolist() == [0, 1, 2, 3, 4, 5, 12, 6, 7, 8, 9, 10, 11, 13]
+    (asked,) = server.requests[0]["examples"]
+    assert [shown.shape for shown in asked["image"]] == [(224, 224, 3)] * 3
+    assert asked["lang"] == "pick the red block" and server.requests[0]["use_ddim"] is True
+    joints = np.concatenate([STATE[:6], STATE[7:13], STATE[[6, 13]]])
+    assert np.array_equal(asked["state"], joints[None])
+    assert float(asked["image"][0][0, 0, 2]) == image(HEAD)[0, 0, 2]
+
+
+def test_a_server_that_cannot_answer_is_refused_before_the_first_trial() -> None:
+    broken = {"status": "error", "error": {"message": "unnorm_key not specified"}}
+    server = Preset("starvla", STARVLA, broken)
+    with server as url, pytest.raises(RunError, match=r"no trial was begun: .*unnorm_key not"):
+        probe(url, {"timeouts": QUICK}, look=True)
+
+
+def test_vllm_is_told_of_a_trial_and_answers_the_actions_themselves() -> None:
+    rows = np.ones((50, 32), np.float32)
+    metadata = {"image_resolution": [224, 224]}
+    server = Preset("vllm", metadata, {"status": "reset successful"}, rows)
+    assert answered(server).shape == (50, 14)
+    assert server.requests[0] == {"endpoint": "reset"}
+    assert server.requests[1]["images"]["observation.images.base_0_rgb"].shape == (240, 320, 3)
+
+
+def test_an_idle_connection_is_made_anew_to_the_same_server_alone() -> None:
+    metadata = {"image_resolution": [1, 1], "ckpt": "1"}
+    server = Preset("vllm", metadata, np.ones((1, 14), np.float32))
+    with talking(server, "?idle=0.01&reset={}") as policy:
+        for _ in range(2):
+            time.sleep(0.02)
+            assert policy.infer(observation()).shape == (1, 14)
+        server.metadata = {**metadata, "ckpt": "2"}  # type: ignore[misc]
+        time.sleep(0.02)
+        with pytest.raises(ConnectionLost, match="another server"):
+            policy.infer(observation())
+
+
+def test_lingbot_has_its_names_at_the_top_and_is_reset() -> None:
+    server = Preset("lingbot", {}, {"action": None}, {"action": joint_chunk()})
+    assert np.array_equal(answered(server), joint_chunk().astype(np.float32))
+    assert server.requests[0] == {"reset": True, "robo_name": "robotwin"}
+    names = [f"observation.images.cam_{name}" for name in ("high", "left_wrist", "right_wrist")]
+    assert sorted(server.requests[1]) == sorted([*names, "observation.state", "task"])
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        {"error": "CUDA out of memory"},
+        {"status": "error", "ok": False, "error": {"message": "CUDA out of memory"}},
+        {"type": "error", "message": "CUDA out of memory"},
+    ],
+)
+def test_an_error_in_a_map_keeps_its_reason(answer: Any) -> None:
+    with pytest.raises(ServerError, match="CUDA out of memory"):
+        answered(Preset("openpi", {}, answer))
+
+
+def test_a_server_of_ones_own_is_a_file(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text('images = ""\nnames = "head:top"\ncameras = "head"\nlayout = "hwc"\n')
+    server = Preset("openpi", {}, {"actions": joint_chunk()})
+    with talking(server, **client_options("openpi://host", file)) as policy:
+        policy.infer(observation(images={HEAD: image(HEAD)}))
+    assert np.array_equal(server.requests[0]["top"], image(HEAD))
+
+
+@pytest.mark.parametrize("option", ["order=0-12", "size=0", "reset=[]"])
+def test_a_preset_that_cannot_be(option: str) -> None:
+    with pytest.raises(ValueError, match=option.partition("=")[0]):
+        client_options(f"openpi://host?{option}", None)

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from wire_helpers import SPEC, TRIAL, observation
 
 from robospa.action_space import KINDS
+from robospa.clients.openpi_family import FamilyOptions
 from robospa.observation import CAMERAS, STATES, CameraSpec
 from robospa.protocol.codec import decode, encode
 from robospa.protocol.errors import DecodeError, PolicyAnswerError, VersionMismatch
@@ -27,7 +28,7 @@ from robospa.protocol.messages import (
     pack,
     unpack,
 )
-from robospa.protocol.openpi import from_openpi, to_openpi
+from robospa.protocol.openpi import from_openpi
 from robospa.protocol.policy import (
     PolicySpec,
     TrialInfo,
@@ -272,7 +273,7 @@ def corpus() -> list[bytes]:
     seen = observation(history={-1: observation()}, privileged={"a": [1, 2.5, None, True]})
     chunk = np.zeros((3, 14), np.float32)
     kinds = [Hello(0, "1.1", "s", SPEC), Reset(1, TRIAL), Infer(2, seen), Actions(2, chunk, {})]
-    return [*map(pack, kinds), encode(to_openpi(observation()))]
+    return [*map(pack, kinds), encode(FamilyOptions().request(observation()))]
 
 
 PIECES = st.binary(max_size=8) | st.sampled_from([b"\xff" * 4, b"\x80\0\0\0", b"\xdd", b"\xc6"])

@@ -13,6 +13,7 @@ from run_fakes import SPEC, FakePolicy
 from robospa.harness.running.policy_probe import (
     ProbedPolicy,
     check_fit,
+    combine_replicas,
     over_budget,
     probe_policies,
     read_map,
@@ -198,3 +199,16 @@ def test_first_actions_are_looked_at_before_the_trials() -> None:
         assert probe_policies(config, KEYS)["Pick_A"].hints == ()
     (said,) = [w for w in warnings_of(found, {}, 1.0) if "metres" in w]
     assert said.startswith(server.url)
+
+
+def test_servers_of_two_checkpoints_are_not_one_policy_in_any_dialect() -> None:
+    one, other, silent = (
+        ProbedPolicy(f"openpi://{name}", SPEC, {"dialect": "openpi", "metadata": said})
+        for name, said in [("a", {"ckpt": "1", "pid": 1}), ("b", {"ckpt": "2"}), ("c", {})]
+    )
+    same = replace(one, target="openpi://d", hello={**one.hello, "metadata": {"ckpt": "1"}})
+    assert combine_replicas([one, same]).replicas == (same,)
+    with pytest.raises(RunError, match=r"metadata\.ckpt is '1' and '2'"):
+        combine_replicas([one, other])
+    with pytest.raises(RunError, match=r"metadata\.ckpt is '1' and 'unset'"):
+        combine_replicas([one, silent])

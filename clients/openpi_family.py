@@ -1,0 +1,464 @@
+"""One client for every server that speaks openpi's codec over a WebSocket.
+
+The server greets with a map about itself and answers each observation with a message that holds
+the actions. What differs from one server to the next is an option: where pictures, joints and text
+go, where an answer has the actions and in which order their columns come, what begins a trial. The
+defaults are openpi's own; `presets.json` has those of other projects, and a TOML file given with
+`--client` those of a user's own server.
+
+`openpi://` reaches whatever runs behind `serve_policy`; `ws://` is our own protocol, `robospa.v1`,
+and a server that does not know it is taken for openpi's.
+"""
+
+import json
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, make_dataclass, replace
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Annotated, Any, get_type_hints
+
+import numpy as np
+from msgspec import Meta
+from numpy.typing import NDArray
+
+from robospa.action_space import ActionSpace
+from robospa.clients.chunks import ChunkOptions, Count, as_chunk, refuse_unread
+from robospa.clients.dialect import ConnectionParams, Dialect, Probe, StatelessSession
+from robospa.clients.numpy_msgpack import unpack
+from robospa.observation import CameraSpec, Observation
+from robospa.protocol.client import WireClient, identity_of, open_wire
+from robospa.protocol.codec import encode
+from robospa.protocol.errors import (
+    ConnectionLost,
+    DecodeError,
+    EncodeError,
+    HandshakeError,
+    ProtocolViolation,
+    ServerError,
+    json_values,
+)
+from robospa.protocol.openpi import CAMERA_NAMES
+from robospa.protocol.options import option, read_options
+from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.protocol.transport import Transport
+from robospa.schema import convert, parse_json
+
+WARNINGS = (
+    "adapt_to_pi is invisible on the wire: the served config must have adapt_to_pi=False for "
+    "data in RoboTwin's conventions, or joint signs and grippers will be wrong",
+    "openpi's sampling noise depends on the order of requests and cannot be seeded from here: two "
+    "runs will differ",
+)
+REMARKS = ("state", "policy_timing", "server_timing")
+"""What an answer may have beside the actions: the state as the model read it, and times."""
+
+
+@dataclass(frozen=True)
+class FamilyOptions(ChunkOptions):
+    """What a server of this family does not say."""
+
+    cameras: str = option("head,left_wrist,right_wrist", "our cameras to send, comma separated")
+    names: str = option("", "other camera names at the server, such as head:cam_top,front:cam_low")
+    state: str = option("commanded", "which joints to send", ("commanded", "measured"))
+    action_dim: int = option(
+        ActionSpace().width, "columns of a chunk: 16 for two arms of seven joints"
+    )
+    text_budget: Count | None = option(
+        150,
+        "tokens that the model keeps of an instruction: pi0.5 has 200 for it and the state "
+        "together, pi0 has 48",
+    )
+    committed: str = option(
+        "",
+        "for a server that does real-time chunking: its names of the committed actions and the "
+        "delay, such as prev_chunk_left_over,inference_delay; empty: not sent",
+    )
+    extra: str = option("{}", "JSON map sent along at the top level of every observation")
+    inside: str = option("", "where the observation goes in a message, such as examples/0")
+    images: str = option("images", "name of the pictures: a map; with [] a list; empty: one by one")
+    layout: str = option("chw", "axes of a picture, uint8 RGB", ("chw", "hwc"))
+    size: Count | None = option(None, "side of the square to which pictures are shrunk by area")
+    joints: str = option("state", "name of the joints; with [] as (1, D); empty: not sent")
+    text: str = option("prompt", "name of the instruction")
+    actions: str = option("actions", "where an answer has the actions; empty: it is the actions")
+    order: tuple[int, ...] = option(
+        (),
+        "in a file: the server's column of each of our numbers, of joints too, as [0, 1, 2]",
+    )
+    reset: str = option("{}", "JSON map sent when a trial begins, which is answered; {}: none")
+    idle: Annotated[float, Meta(ge=0)] = option(
+        0.0, "seconds after which an idle connection is made anew; 0: never"
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.camera_names, self.committed_names  # noqa: B018
+        self.maps["extra"], self.maps["reset"]
+        if self.order and sorted(self.order) != list(range(self.action_dim)):
+            raise ValueError(
+                f"option order={self.order} is not an order of {self.action_dim} columns"
+            )
+        try:
+            PolicySpec.from_json(self.spec("server").to_json())
+        except DecodeError as error:
+            raise ValueError(f"options that cannot be: {error}") from error
+
+    def spec(self, name: str) -> PolicySpec:
+        """What these options make of a server that says nothing of itself."""
+        return self.spec_of(
+            name,
+            cameras=tuple(CameraSpec(name) for name in self.cameras.split(",") if name),
+            state=self.state if self.joints else "none",
+            action_dim=self.action_dim,
+            committed_actions=bool(self.committed),
+            text_budget=self.text_budget,
+        )
+
+    @cached_property
+    def camera_names(self) -> dict[str, str]:
+        """The server's name of each of our cameras."""
+        names = dict(CAMERA_NAMES)
+        for pair in filter(None, self.names.split(",")):
+            ours, colon, theirs = pair.partition(":")
+            if ours not in CAMERA_NAMES or not colon or not theirs:
+                raise ValueError(f"option names: {pair!r} is not of the form camera:name")
+            names[ours] = theirs
+        return names
+
+    @cached_property
+    def committed_names(self) -> tuple[str, str] | None:
+        """The server's names of our `committed` and `delay`; None if it reads neither."""
+        if not self.committed:
+            return None
+        rows, comma, delay = self.committed.partition(",")
+        if not (comma and rows and delay) or "," in delay:
+            raise ValueError(f"option committed={self.committed[:80]!r} is not two names")
+        return rows, delay
+
+    @cached_property
+    def maps(self) -> dict[str, dict[str, object]]:
+        """The options `extra` and `reset` as maps."""
+        return {name: _json_map(name, getattr(self, name)) for name in ("extra", "reset")}
+
+    def request(self, observation: Observation) -> dict[str, object]:
+        """The message for one observation; raises EncodeError for a camera without a name there."""
+        shown = {}
+        for name, image in observation.get("images", {}).items():
+            if name not in self.camera_names:
+                known = ", ".join(self.camera_names)
+                raise EncodeError(f"camera {name!r} has no openpi name; cameras with one: {known}")
+            small = image if self.size is None else shrunk(image, self.size)
+            shown[name] = np.moveaxis(small, -1, 0) if self.layout == "chw" else small
+        sent: dict[str, object] = {self.camera_names[name]: image for name, image in shown.items()}
+        if self.images.endswith("[]"):
+            sent = {self.images[:-2]: [shown[name] for name in self.cameras.split(",")]}
+        elif self.images:
+            sent = {self.images: sent}
+        sent[self.text] = observation.get("instruction", "")
+        if "state" in observation and self.joints:
+            joints = np.asarray(observation["state"], np.float64)
+            if len(self.order) == len(joints):
+                joints = joints[np.argsort(self.order)]
+            name = self.joints.removesuffix("[]")
+            sent[name] = joints if name == self.joints else joints[None]
+        if self.committed_names is not None and "committed" in observation:
+            rows, delay = self.committed_names
+            sent[rows] = np.asarray(observation["committed"], np.float64)
+            sent[delay] = observation["delay"]
+        for name in reversed([n for n in self.inside.split("/") if n and n != "0"]):
+            sent = {name: [sent] if f"{name}/0" in self.inside else sent}
+        return {**self.maps["extra"], **sent}
+
+    def chunk(self, answer: object) -> object:
+        """The chunk (T, D) in an answer, its columns in our order; what is none is returned, to be
+        refused as one. Raises PolicyAnswerError for numbers that nobody reads."""
+        found: Any = answer
+        for name in self.actions.split("/") if self.actions else ():
+            if isinstance(found, Mapping):
+                refuse_unread(found, {name, *REMARKS})
+                found = found.get(name)
+            elif isinstance(found, list | np.ndarray) and name.isdecimal():
+                found = found[int(name)] if int(name) < len(found) else None
+        chunk = as_chunk(found)
+        if not self.order or not isinstance(chunk, np.ndarray) or chunk.ndim != 2:
+            return chunk
+        ours, width = list(self.order), chunk.shape[1]
+        more = width > len(ours) and ours == sorted(ours)
+        return chunk[:, ours] if more or width == len(ours) else chunk
+
+
+def _json_map(name: str, text: str) -> dict[str, object]:
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        found = None
+    if not isinstance(found, dict):
+        raise ValueError(f"option {name}={text[:80]!r} is not a JSON map")
+    return found
+
+
+def _averaged(rows: NDArray[np.float32], new: int) -> NDArray[np.float32]:
+    """`rows` (N, W, C) as `new` rows, each the mean of N / new; summed one after another, as OpenCV
+    does it, so that no value is rounded another way."""
+    scale = len(rows) / new
+    start, mean = np.arange(new) * scale, np.zeros((new, *rows.shape[1:]), np.float32)
+    for tap in range(math.ceil(scale) + 1):
+        row = np.floor(start).astype(int) + tap
+        share = (
+            np.clip(np.minimum(start + scale, row + 1) - np.maximum(start, row), 0, None) / scale
+        )
+        mean += rows[np.minimum(row, len(rows) - 1)] * share.astype(np.float32)[:, None, None]
+    return mean
+
+
+def shrunk(image: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
+    """`image` (H, W, 3) as (size, size, 3): each new pixel is the mean of the area that it covers,
+    as of OpenCV's INTER_AREA. Raises EncodeError for one that would have to grow."""
+    if size > min(image.shape[:2]):
+        raise EncodeError(f"a picture of shape {image.shape} cannot be shrunk to size={size}")
+    across = _averaged(image.swapaxes(0, 1).astype(np.float32), size).swapaxes(0, 1)
+    small: NDArray[np.uint8] = np.rint(_averaged(across, size)).astype(np.uint8)
+    return small
+
+
+def reason_of(answer: Mapping[str, object]) -> str:
+    """What went wrong, of an answer that reports it in a map; "" for any other."""
+    said = answer.get("error")
+    if isinstance(said, Mapping):
+        said = said.get("message") or said
+    marked = "error" in (answer.get("status"), answer.get("type")) or answer.get("ok") is False
+    if not marked and not (isinstance(said, str | Mapping) and said):
+        return ""
+    return str(said or answer.get("message") or answer.get("detail") or "no reason given")
+
+
+@dataclass(frozen=True)
+class Preset:
+    """What distinguishes the servers of one project, beside the defaults of their options.
+
+    `server` completes "it looks like ...". `greeting`: what its first map has, a name and its
+    value, or any. `fixed` goes into every message.
+    """
+
+    server: str
+    source: str = ""
+    port: int = 8000
+    path: str = ""
+    greeting: tuple[str, str] = ("", "")
+    fixed: dict[str, object] = field(default_factory=dict)
+    shared_state: bool = False
+    warnings: tuple[str, ...] = ()
+    options: dict[str, object] = field(default_factory=dict)
+
+    def greets(self, metadata: Mapping[str, object]) -> bool:
+        """Whether the first map of a server is that of this preset; StarVLA's is no other's."""
+        name, value = self.greeting
+        if not name:
+            return metadata.get("env") != "starvla_policy_server"
+        return name in metadata and value in ("", metadata[name])
+
+
+OPENPI = Preset("an openpi server", warnings=WARNINGS)
+
+
+class FamilySession(StatelessSession):
+    """One connection to a server of the family: `transport`, or what `connect` makes, then and
+    whenever one was idle for too long.
+
+    The server sends one metadata map, then answers each message. A text frame is an error with the
+    server's traceback, after which it closes; a map may report an error too. There is no request id
+    and no spec on the wire.
+    """
+
+    def __init__(
+        self,
+        connect: Callable[[], Transport],
+        options: FamilyOptions,
+        params: ConnectionParams,
+        name: str = "openpi",
+        preset: Preset = OPENPI,
+        transport: Transport | None = None,
+    ) -> None:
+        self._connect, self._options, self._preset = connect, options, preset
+        self._timeouts, self._limits = params.timeouts, params.limits
+        self._used = time.monotonic()
+        self._transport = transport or connect()
+        try:
+            metadata = self._greeting(params.timeouts.hello)
+        except BaseException:
+            self.close()
+            raise
+        spec = options.spec(name)
+        super().__init__(name, spec, options, preset.warnings, metadata=json_values(metadata))
+
+    def _greeting(self, timeout: float) -> Mapping[str, object]:
+        metadata = self._receive(timeout, "metadata")
+        if not isinstance(metadata, dict):
+            raise self._violation(": metadata is not a map")
+        if not self._preset.greets(metadata):
+            raise HandshakeError(
+                f"{self._transport.url} does not greet as {self._preset.server} does"
+            )
+        return metadata
+
+    def reset(self, id: int, trial: TrialInfo) -> None:
+        if self._options.maps["reset"]:
+            answer = self._ask(
+                self._options.maps["reset"], self._timeouts.reset, "a reset's answer"
+            )
+            self._check(answer)
+
+    def infer(
+        self, id: int, observation: Observation, timeout: float
+    ) -> tuple[object, Mapping[str, float]]:
+        request = {**self._preset.fixed, **self._options.request(observation)}
+        answer = self._ask(request, timeout, "actions")
+        if self._options.actions and not isinstance(answer, Mapping):
+            raise self._violation(": actions is not a map")
+        self._check(answer)
+        return self._options.chunk(answer), _timing(answer)
+
+    def close(self) -> None:
+        self._transport.close()
+
+    def _ask(self, request: dict[str, object], timeout: float, what: str) -> object:
+        if 0 < self._options.idle < time.monotonic() - self._used:
+            self._renew()
+        if self._transport.has_more():
+            raise self._violation(" sent data that was not requested")
+        self._transport.send(encode(request, self._limits))
+        answer = self._receive(timeout, what)
+        self._used = time.monotonic()
+        return answer
+
+    def _renew(self) -> None:
+        """A new connection in place of an idle one, to the same server as before."""
+        self.close()
+        self._transport = self._connect()
+        now = {**self.hello, "metadata": json_values(self._greeting(self._timeouts.infer))}
+        if identity_of(self.hello).changes(identity_of(now)):
+            self.close()
+            raise ConnectionLost(f"{self._transport.url} is another server than before")
+
+    def _check(self, answer: object) -> None:
+        if isinstance(answer, Mapping) and (reason := reason_of(answer)):
+            raise ServerError("an error", reason, True, self._transport.url)
+
+    def _violation(self, what: str) -> ProtocolViolation:
+        self.close()
+        return ProtocolViolation(f"{self._transport.url}{what}")
+
+    def _receive(self, timeout: float, what: str) -> object:
+        data = self._transport.receive(timeout, what)
+        if isinstance(data, str):
+            self.close()
+            lines = data.strip().splitlines() or ["no text"]
+            error = ServerError("openpi", lines[-1], True, self._transport.url)
+            error.add_note(data)
+            raise error
+        try:
+            return unpack(data, self._limits, lenient=True)
+        except DecodeError as error:
+            raise self._violation(f": unreadable {what}: {error}") from error
+
+
+def _timing(answer: object) -> dict[str, float]:
+    for name in ("policy_timing", "server_timing"):
+        times = answer.get(name) if isinstance(answer, Mapping) else None
+        if isinstance(times, dict) and isinstance(times.get("infer_ms"), (int, float)):
+            return {"infer_ms": float(times["infer_ms"])}
+    return {}
+
+
+DECIDING_OPTIONS = {"measured state": "state", "arms swapped": "order"}
+
+
+def dialect(
+    name: str, preset: Preset, options: type[FamilyOptions] = FamilyOptions, **more: Any
+) -> Dialect:
+    """The dialect `name://` of the servers of one `preset`; `more` are other fields of it."""
+    said = " = ".join(filter(None, preset.greeting))
+
+    def open_session(params: ConnectionParams, chosen: FamilyOptions) -> FamilySession:
+        address = replace(params.websocket_address(), token_kind="Api-Key")
+        if not params.endpoint.path.strip("/"):
+            address = replace(address, url=address.url.rstrip("/") + preset.path)
+        connect = partial(Transport, address, params.timeouts, params.limits, None)
+        return FamilySession(connect, chosen, params, name, preset)
+
+    def recognise(probe: Probe) -> bool:
+        """By its greeting, of which other servers may have one too."""
+        open_session(probe.params, options()).close()
+        return True
+
+    return Dialect(
+        server=preset.server,
+        scheme=name,
+        wire="websocket",
+        port=preset.port,
+        options=options,
+        open_session=open_session,
+        recognise=recognise if said or preset is OPENPI else None,
+        sign=f"its greeting has {said}" if said else "it greets unasked, with a map",
+        deciding_options=DECIDING_OPTIONS,
+        shared_state=preset.shared_state,
+        **more,
+    )
+
+
+def preset_dialect(name: str) -> Dialect:
+    """The dialect `name://` of `presets.json`, whose options have the defaults given there."""
+    chosen = read_options(FamilyOptions, PRESETS[name].options)
+    hints = get_type_hints(FamilyOptions, include_extras=True)
+    changed = [
+        (f.name, hints[f.name], option(getattr(chosen, f.name), **f.metadata))
+        for f in fields(FamilyOptions)
+        if f.name in PRESETS[name].options
+    ]
+    options = make_dataclass(f"{name}Options", changed, bases=(FamilyOptions,), frozen=True)
+    return dialect(name, PRESETS[name], options)
+
+
+PRESETS = convert(
+    parse_json(Path(__file__).with_name("presets.json").read_text()), dict[str, Preset]
+)
+STARVLA, VLLM, LINGBOT = map(preset_dialect, ("starvla", "vllm", "lingbot"))
+DIALECT = dialect("openpi", OPENPI, weak_sign=True, also_reaches=("ws",))
+"""Our own server also answers an openpi client."""
+
+
+def open_ours(params: ConnectionParams, options: FamilyOptions) -> WireClient:
+    """A connection in the dialect that the server selects; the options are used only if it turns
+    out to speak openpi's: ours tells everything."""
+    address, timeouts, limits = params.websocket_address(), params.timeouts, params.limits
+    connect = partial(Transport, address, timeouts, limits, None)
+    return open_wire(
+        address,
+        timeouts,
+        limits,
+        lambda transport: FamilySession(connect, options, params, transport=transport),
+    )
+
+
+def recognise_ours(probe: Probe) -> bool:
+    """It selects our subprotocol."""
+    params = probe.params
+    transport = Transport(params.websocket_address(), params.timeouts, params.limits)
+    transport.close()
+    return transport.subprotocol is not None
+
+
+OURS = Dialect(
+    server="a robospa.v1 server",
+    scheme="ws",
+    secure_scheme="wss",
+    wire="websocket",
+    options=FamilyOptions,
+    open_session=open_ours,
+    recognise=recognise_ours,
+    sign="it selects the subprotocol robospa.v1",
+    also_reaches=("openpi",),
+    deciding_options=DECIDING_OPTIONS,
+)
