@@ -134,5 +134,6 @@ DIALECT = Dialect(
     options=OftClientOptions,
     open_session=OftSession,
     recognise=recognise,
+    sign='it answers an empty question with 200 and "error"',
     deciding_options={"measured state": "state"},
 )

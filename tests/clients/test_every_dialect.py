@@ -289,7 +289,7 @@ def test_robospa_check_finds_every_dialect_fit(name: str) -> None:
 
 def test_which_servers_have_one_state_for_all_connections() -> None:
     shared = {dialect.scheme for dialect in dialects() if dialect.shared_state}
-    assert shared == {"xpolicylab", "robotwin+tcp"}
+    assert shared == {"lingbot", "xpolicylab", "robotwin+tcp"}
 
 
 @pytest.mark.parametrize("name", ["xpolicylab", "robotwin"])
