@@ -20,11 +20,15 @@ from robospa.geometry import Pose
 from robospa.harness.official import official_world
 from robospa.harness.official.layout import (
     BUILTIN_SUITE,
+    IDS,
     SUITE,
+    SWITCHES,
     OfficialLayout,
     OfficialOptions,
+    chosen,
     official_world_parts,
     parse_official,
+    switched,
 )
 from robospa.harness.official.sentences import (
     SEEN,
@@ -36,7 +40,6 @@ from robospa.harness.official.sentences import (
     read_checkout,
 )
 from robospa.harness.official.slots import SLOTS, NoOfficialSentence, official_values
-from robospa.harness.official.switches import IDS, SWITCHES, chosen, switched
 from robospa.harness.running import evaluate
 from robospa.harness.running.policy_probe import ProbedPolicy
 from robospa.harness.running.request import make_request

@@ -19,21 +19,19 @@ from robospa.geometry import Pose
 from robospa.harness.replay import ReplayError
 from robospa.harness.robots import embodiment
 from robospa.harness.running.manifest import this_processor, write_manifest
-from robospa.harness.viewer.playback import (
+from robospa.harness.viewer.show import (
     DrawnBody,
     DrawnMesh,
     Moment,
     Playback,
-    drawn_bodies,
-    meshes,
-    moments,
-    playback_of,
-)
-from robospa.harness.viewer.show import (
     PoseRecorder,
     Scene3D,
     as_html,
+    drawn_bodies,
+    meshes,
+    moments,
     play,
+    playback_of,
     recorded_playback,
     serving,
     trial_named,
