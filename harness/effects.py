@@ -1,73 +1,68 @@
 """What a scene's mode does beyond the scene: to pictures, actions, the start pose and the clock.
 
-Every effect is a pure function of the trial's scene (task, level, seed), the axis with its
-strength, and the action number: the same in every worker and whenever a trial is repeated. Actions
-are changed before they are executed and recorded, so that a replay needs no axis.
+Every effect is a pure function of the scene's task, level and seed, the axis with its strength, the
+camera and the action's number. Actions are changed before they are executed and recorded, so that a
+replay needs no axis.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.action_space import ActionSpace
+from robospa.harness.clock.policy_clock import PolicyClock
 from robospa.observation import View
+from robospa.protocol.codec import decode_jpeg, encode_jpeg
 from robospa.tasks.catalog import generator
 from robospa.tasks.scene import Scene
 
-if TYPE_CHECKING:
-    from robospa.action_space import ActionSpace
-    from robospa.harness.clock.policy_clock import PolicyClock
-
 Image = NDArray[np.uint8]
+Change = Callable[[Image, float, np.random.Generator], Image]
+"""A picture (height, width, 3) RGB at a strength of the axis."""
 V = TypeVar("V", bound=View)
 RADIANS_PER_MM = 0.1 * np.pi / 180
 """A tenth of a degree moves a hand at the end of an arm of 0.57 m by a millimetre."""
-TOLD = "effects"
-"""What seeds the random streams here, with scene and axis."""
+COLUMNS = 320
+"""Strengths in pixels are of a picture so wide."""
+
+
+def _pixels(values: NDArray[np.floating]) -> Image:
+    return np.asarray(np.clip(np.rint(values), 0, 255), dtype=np.uint8)
 
 
 def _blurred(image: Image, sigma: float, rng: np.random.Generator) -> Image:
-    """Blurred by a Gaussian of `sigma` pixels of a picture of 320 columns."""
-    sigma *= image.shape[1] / 320
+    sigma *= image.shape[1] / COLUMNS
     reach = max(1, round(3 * sigma))
     weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2).astype(np.float32)
-    weights /= weights.sum()
     found = image.astype(np.float32)
     for axis in (0, 1):
-        width = [(reach, reach) if k == axis else (0, 0) for k in range(3)]
-        wide = np.pad(found, width, "edge")
-        rows = [slice(k, k + image.shape[axis]) for k in range(2 * reach + 1)]
-        parts = (wide[r] if axis == 0 else wide[:, r] for r in rows)
-        found = np.zeros_like(found)
-        for weight, part in zip(weights, parts, strict=True):
-            found += weight * part
+        wide = np.pad(np.moveaxis(found, axis, 0), [(reach, reach), (0, 0), (0, 0)], "edge")
+        total = np.zeros_like(wide[2 * reach :])
+        for k, weight in enumerate(weights / weights.sum()):
+            total += weight * wide[k : k + len(total)]
+        found = np.moveaxis(total, 0, axis)
     return _pixels(found)
 
 
 def _noisy(image: Image, levels: float, rng: np.random.Generator) -> Image:
-    """With normal noise of so many of 255 grey levels in every pixel."""
-    noise = rng.standard_normal(image.shape, dtype=np.float32)
-    return _pixels(image + np.float32(levels) * noise)
+    return _pixels(image + np.float32(levels) * rng.standard_normal(image.shape, dtype=np.float32))
 
 
 def _as_jpeg(image: Image, loss: float, rng: np.random.Generator) -> Image:
-    from robospa.protocol.codec import decode_jpeg, encode_jpeg
-
     return decode_jpeg(encode_jpeg(image, 100 - round(loss)))
 
 
-def _exposed(sign: int) -> Callable[[Image, float, np.random.Generator], Image]:
-    """So many stops brighter or darker: linear light doubled or halved."""
+def _brighter(image: Image, stops: float, rng: np.random.Generator) -> Image:
+    """Linear light times 2^stops."""
+    light = np.minimum(1.0, (np.arange(256) / 255) ** 2.2 * 2.0**stops)
+    return np.asarray(_pixels(255 * light ** (1 / 2.2))[image])
 
-    def change(image: Image, stops: float, rng: np.random.Generator) -> Image:
-        table = 255 * np.minimum(1.0, (np.arange(256) / 255) ** 2.2 * 2.0 ** (sign * stops))
-        return np.asarray(_pixels(255 * (table / 255) ** (1 / 2.2))[image])
 
-    return change
+def _darker(image: Image, stops: float, rng: np.random.Generator) -> Image:
+    return _brighter(image, -stops, rng)
 
 
 def _grey(image: Image, strength: float, rng: np.random.Generator) -> Image:
@@ -76,10 +71,8 @@ def _grey(image: Image, strength: float, rng: np.random.Generator) -> Image:
 
 
 def _shifted(image: Image, pixels: float, rng: np.random.Generator) -> Image:
-    """Moved by so many pixels of 320 in a direction of the trial's, as by a small turn of the
-    camera; the edge is repeated."""
-    turn = rng.uniform(0, 2 * np.pi)
-    far = pixels * image.shape[1] / 320
+    """As by a small turn of the camera, in a direction of the trial's; the edge is repeated."""
+    turn, far = rng.uniform(0, 2 * np.pi), pixels * image.shape[1] / COLUMNS
     ends = zip(image.shape[:2], (np.sin(turn), np.cos(turn)), strict=True)
     rows, columns = (np.clip(np.arange(n) + round(far * way), 0, n - 1) for n, way in ends)
     return np.ascontiguousarray(image[rows][:, columns])
@@ -89,31 +82,20 @@ def _black(image: Image, strength: float, rng: np.random.Generator) -> Image:
     return np.zeros_like(image)
 
 
-def _pixels(values: NDArray[np.floating]) -> Image:
-    return np.asarray(np.clip(np.rint(values), 0, 255), dtype=np.uint8)
-
-
-@dataclass(frozen=True)
-class PictureEffect:
-    """What happens to the pictures of cameras (`on` part of their names); one that is not
-    `lasting` is drawn anew for every picture."""
-
-    change: Callable[[Image, float, np.random.Generator], Image]
-    on: str = ""
-    lasting: bool = True
-
-
-PICTURES: Mapping[str, PictureEffect] = {
-    "bright": PictureEffect(_exposed(1)),
-    "dark": PictureEffect(_exposed(-1)),
-    "grey": PictureEffect(_grey),
-    "wrist-shift": PictureEffect(_shifted, on="wrist"),
-    "no-wrists": PictureEffect(_black, on="wrist"),
-    "blur": PictureEffect(_blurred),
-    "noise": PictureEffect(_noisy, lasting=False),
-    "jpeg": PictureEffect(_as_jpeg),
+NOISE = "noise"
+"""The one that is drawn anew for every picture."""
+PICTURES: Mapping[str, tuple[Change, str]] = {
+    "bright": (_brighter, ""),
+    "dark": (_darker, ""),
+    "grey": (_grey, ""),
+    "wrist-shift": (_shifted, "wrist"),
+    "no-wrists": (_black, "wrist"),
+    "blur": (_blurred, ""),
+    NOISE: (_noisy, ""),
+    "jpeg": (_as_jpeg, ""),
 }
-"""In the order of a camera: light, lens, sensor, compression."""
+"""What happens to the pictures of cameras with that in their names, in the order of a camera:
+light, lens, sensor, compression."""
 
 
 @dataclass(frozen=True)
@@ -122,22 +104,21 @@ class Effects:
 
     scene: Scene
 
-    def _generator(self, axis: str, *place: object) -> np.random.Generator:
+    def _generator(self, *place: object) -> np.random.Generator:
         scene = self.scene
-        words = (scene.suite, TOLD, scene.task, scene.level, scene.seed, axis, *place)
+        words = (scene.suite, "effects", scene.task, scene.level, scene.seed, *place)
         return generator("/".join(map(str, words)))
 
     def seen(self, view: V, step: int) -> V:
         """`view`, taken after `step` actions, as the policy gets it."""
-        active = [name for name in PICTURES if name in self.scene.strengths]
-        if not active or not view.get("images"):
+        strengths = self.scene.strengths
+        images = dict(view["images"]) if "images" in view else {}
+        if not images or not strengths.keys() & PICTURES.keys():
             return view
-        images = dict(view["images"])
-        for name in active:
-            effect, strength = PICTURES[name], self.scene.strengths[name]
-            for camera in (c for c in images if effect.on in c):
-                rng = self._generator(name, camera, *(() if effect.lasting else (step,)))
-                images[camera] = effect.change(images[camera], strength, rng)
+        for name, (change, on) in PICTURES.items():
+            for camera in (c for c in images if name in strengths and on in c):
+                rng = self._generator(name, camera, step if name == NOISE else "")
+                images[camera] = change(images[camera], strengths[name], rng)
         changed = view.copy()
         changed["images"] = images
         return changed
@@ -147,25 +128,23 @@ class Effects:
     ) -> NDArray[np.float32]:
         """The actions (T, D) of a chunk asked for after `step` actions, as they are executed:
         strengths are millimetres of a position, or as much of a joint."""
-        made = chunk
-        for axis, lasting in (("action-noise", False), ("action-bias", True)):
+        joints = space.kind == "joint"
+        parts = [arm.body if joints else arm.position for arm in space.arms]
+        columns = [c for part in parts for c in range(part.start, part.stop)]
+        numbers = range(step, step + len(chunk))
+        for axis, places in (("action-noise", numbers), ("action-bias", ("",))):
             if strength := self.scene.strengths.get(axis, 0.0):
-                joints = space.kind == "joint"
-                parts = [arm.body if joints else arm.position for arm in space.arms]
-                columns = [c for part in parts for c in range(part.start, part.stop)]
                 size = strength * (RADIANS_PER_MM if joints else 1e-3)
-                places = [()] if lasting else [(step + k,) for k in range(len(made))]
-                rows = [self._generator(axis, *at).standard_normal(len(columns)) for at in places]
-                made = made.copy()
-                made[:, columns] += np.asarray(rows, dtype=np.float32) * np.float32(size)
-        return made
+                rows = [self._generator(axis, at).standard_normal(len(columns)) for at in places]
+                chunk = chunk.copy()
+                chunk[:, columns] += np.asarray(rows, dtype=np.float32) * np.float32(size)
+        return chunk
 
     def start(self, joints: NDArray[np.float32], space: ActionSpace) -> NDArray[np.float32]:
         """The joint action (D,) that brings the arms from `joints` (D,) to where they start."""
-        degrees = self.scene.strengths.get("start", 0.0)
-        made = joints.copy()
         draws = self._generator("start").uniform(-1, 1, len(space.bodies))
-        made[space.bodies] += np.asarray(np.radians(degrees) * draws, dtype=np.float32)
+        made = joints.copy()
+        made[space.bodies] += np.radians(self.scene.strengths["start"] * draws).astype(np.float32)
         return made
 
     def timed(self, clock: PolicyClock | None) -> PolicyClock | None:

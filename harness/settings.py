@@ -116,10 +116,6 @@ class Simulation:
         None, "what trials' ids and policy seeds follow from; default: a secret of the run's own"
     )
     step_scale: Scale = option(1.0, "multiplies the official step limits; 1 is the benchmark")
-    shuffle_instructions: bool = option(
-        False,
-        "an ablation, never ranked: every trial gets the sentence of another scene of its variant",
-    )
     world: str = option(
         "sapien",
         "where trials run: sapien; official, with official objects and quirks; or checkout:DIR, a "
@@ -141,10 +137,6 @@ class Simulation:
         _check(
             self.run_seed is None or re.fullmatch(RUN_SEED, self.run_seed) is not None,
             f"run_seed {self.run_seed!r} is not 1 to 64 letters and digits",
-        )
-        _check(
-            self.parts is None or not self.shuffle_instructions,
-            "shuffle_instructions goes with the suite's own trials: leave out parts",
         )
 
 

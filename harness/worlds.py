@@ -8,21 +8,14 @@ is known.
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from robospa.harness.clock.policy_clock import FIXED_RATE, steps_of
 from robospa.harness.settings import EvaluationSettings, Selection, SettingsError
-from robospa.harness.trial import TrialSetup, task_parts
 from robospa.registry import WORLDS, UnknownName, find, load, names
 from robospa.results.records.manifest import LayoutSettings
-from robospa.tasks.catalog import build_scene
-from robospa.tasks.scene import SUITE
-from robospa.tasks.seeds import FIRST_TRAINING_SEED, LAST_TRAINING_SEED
-from robospa.tasks.sentences import instruction
 from robospa.trial import TrialKey
 
 if TYPE_CHECKING:
@@ -30,8 +23,6 @@ if TYPE_CHECKING:
 
 SAPIEN_NAME = "sapien"
 TASK_PARTS = "robospa.harness.trial:task_parts"
-SHUFFLED_PARTS = "robospa.harness.worlds:shuffled_parts"
-"""The suite's trials with the sentences of other scenes."""
 SPOKEN_PARTS = "robospa.harness.official.sentences:spoken_parts"
 """The suite's trials with the sentences of a RoboSPA checkout."""
 Parts = tuple[str, dict[str, object]]
@@ -76,10 +67,6 @@ class WorldKind:
         """What finds the scene, goal and sentence of one of `keys`; raises SettingsError. Sentences
         of a checkout are read here, once: workers get them as data."""
         folder, own = settings.selection.instructions, settings.simulation.parts
-        if settings.simulation.shuffle_instructions:
-            if folder is not None:
-                raise SettingsError("shuffle_instructions goes without instructions of a checkout")
-            return SHUFFLED_PARTS, {}
         if folder is None:
             return own or TASK_PARTS, {}
         if own is not None:
@@ -135,22 +122,3 @@ def open_world(
 ) -> World:
     """A world of the kind that `world` names; see `WorldKind.open`."""
     return world_kind(world).open(arguments or {}, render)
-
-
-def shuffled_parts(key: TrialKey, salt: str = "") -> TrialSetup:
-    """Scene and goal of `key` with the sentence, of the same split, of another scene of its
-    variant: an ablation, never ranked. A policy that understands its sentence falls to chance; one
-    that does not lose by it has found the target elsewhere. KeyError or ValueError if the key is
-    unknown."""
-    found = task_parts(key, salt)
-    seed = other_seed(key)
-    other = build_scene(key.task, key.level, seed, key.embodiment, key.mode, salt)
-    return replace(found, instruction=instruction(other, key.split, salt))
-
-
-def other_seed(key: TrialKey) -> int:
-    """The seed of the scene whose sentence the trial `key` gets: of the range that no evaluation
-    has, and the same for every robot, mode and split."""
-    place = "/".join([SUITE, "shuffled", key.task, str(key.level), str(key.seed)])
-    drawn = int.from_bytes(hashlib.sha256(place.encode()).digest()[:8], "big")
-    return FIRST_TRAINING_SEED + drawn % (LAST_TRAINING_SEED - FIRST_TRAINING_SEED + 1)

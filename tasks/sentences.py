@@ -25,6 +25,7 @@ from robospa.tasks.instructions import SENTENCES, SPLITS, Templates, fill, slot_
 from robospa.tasks.modes.wording import REWORDED, about_nothing_here, reworded
 from robospa.tasks.objects import object_model
 from robospa.tasks.scene import Scene
+from robospa.tasks.seeds import FIRST_TRAINING_SEED, LAST_TRAINING_SEED
 
 
 def templates(task: str, level: int) -> Templates:
@@ -62,6 +63,11 @@ def instruction(scene: Scene, split: str = "heldout", salt: str = "") -> str:
     what the scene's mode makes of it."""
     if "no-sentence" in scene.strengths:
         return ""
+    if "other-scene" in scene.strengths:  # of seeds that no evaluation has
+        seeds = LAST_TRAINING_SEED - FIRST_TRAINING_SEED
+        drawn = int(_generator(scene, split, "other scene", salt).integers(seeds))
+        other = catalog.build_scene(scene.task, scene.level, FIRST_TRAINING_SEED + drawn, salt=salt)
+        return instruction(other, split, salt)
     split = "indirect" if "indirect" in scene.strengths else split
     made = sentences(scene, split, salt)
     index = int(_generator(scene, split, "instruction", salt).integers(SENTENCES))

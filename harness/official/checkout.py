@@ -82,7 +82,7 @@ class _CheckoutKind(WorldKind):
             ("control", simulation.control != "rest_to_rest", "executes actions in its own way"),
             ("action_rate and clock", timed, "executes actions in its own way"),
             ("parts", simulation.parts, "has goals of its own"),
-            ("shuffle_instructions", simulation.shuffle_instructions, "has its own sentences"),
+            ("profile", selection.profile, "has its own scenes and sentences"),
         ):
             if given:
                 raise SettingsError(f"a checkout {why}: leave {setting} out")

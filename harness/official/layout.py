@@ -341,8 +341,6 @@ class _OfficialKind(SapienKind):
     def selection(self, settings: EvaluationSettings) -> Selection:
         """As they are; lets this process and its workers find the archive that is named."""
         simulation = settings.simulation
-        if simulation.shuffle_instructions:
-            raise SettingsError("shuffle_instructions goes with the suite's own world alone")
         if simulation.parts is not None:
             raise SettingsError("parts has scenes and sentences of its own: leave it out")
         use_archive(simulation)

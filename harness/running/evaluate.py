@@ -37,7 +37,7 @@ from robospa.harness.running.tracking import CarefulTracker, open_tracker
 from robospa.harness.running.worker import WorkerConfig, describe, load_parts
 from robospa.harness.settings import FILE, Compute, EvaluationSettings, to_toml
 from robospa.harness.trial import new_run_seed, salt_hash
-from robospa.harness.worlds import SHUFFLED_PARTS, open_world, world_kind
+from robospa.harness.worlds import open_world, world_kind
 from robospa.results.records.manifest import (
     ClockSettings,
     RunManifest,
@@ -157,7 +157,6 @@ def make_manifest(request: Request, policies: Mapping[str, ProbedPolicy]) -> Run
         run_seed=config.run_seed,
         step_scale=config.step_scale,
         world=WorldSettings(config.world, dict(config.world_arguments)),
-        shuffled_instructions=config.parts == SHUFFLED_PARTS,
         clock=None if config.clock is None else ClockSettings(**config.clock.to_json()),
         salt_sha256=salt_hash(config.salt) if config.salt else "",
         policies={task: p.settings() for task, p in policies.items()} if several else {},

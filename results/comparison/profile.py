@@ -1,10 +1,8 @@
 """What each axis costs: the trials of a run under an axis against its clean ones on the same seeds.
 
-A *cost* is the paired difference of success under an axis, over all trials, with Tango's interval
-and McNemar's p; Holm's correction over a table keeps the chance of any false alarm in it at 5 %.
-Where the sentence was changed on purpose, what counts is which object was taken: with another
-target the right one is that, without a sentence guessing is right, and of a thing that is not
-there nothing is to be taken. `docs/profile.md` has the axes.
+A *cost* is the paired difference of success, over all trials, with Tango's interval and McNemar's
+p; Holm's correction keeps the chance of any false alarm in a table at 5 %. Where the sentence was
+changed on purpose, what counts is which object was taken. `docs/profile.md` has the axes.
 """
 
 from __future__ import annotations
@@ -12,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
+from robospa.results.comparison.compare import chance
 from robospa.results.failures.attribution import roles_of
 from robospa.results.records.manifest import RunError
 from robospa.results.records.runs import Run, finished
@@ -28,18 +27,18 @@ from robospa.results.tables import (
     TableRow,
     estimate_cell,
 )
-from robospa.trial import CATEGORY_NAMES, METRIC_NAMES, PROCEDURAL, TrialKey
+from robospa.trial import CATEGORY_NAMES, METRIC_NAMES, PROCEDURAL
 
 CLEAN, PARTS = "clean", "randomized:"
-NO_COST = ("no-sentence", "nothing-here")
+NO_COST = ("other-scene", "no-sentence", "nothing-here")
 """Axes under which a policy that reads does not succeed."""
 Pair = tuple[TrialRecord, TrialRecord]
 """A trial in the clean scene, and on the same seed under an axis."""
-BY: Mapping[str, Callable[[TrialKey, str], str]] = {
-    "all": lambda key, category: "",
-    "category": lambda key, category: category,
-    "level": lambda key, category: f"L{key.level}",
-    "task": lambda key, category: key.task,
+BY: Mapping[str, Callable[[TrialRecord], str]] = {
+    "all": lambda record: "",
+    "category": lambda record: record.category,
+    "level": lambda record: f"L{record.key.level}",
+    "task": lambda record: record.key.task,
 }
 """What costs may be told by."""
 
@@ -70,6 +69,15 @@ class Cost:
         """Whether the axis is shown to change success."""
         return self.holm < ALPHA
 
+    @property
+    def row(self) -> TableRow:
+        """As it stands in the table."""
+        rates = [TableCell(f"{100 * rate:.1f}", 100 * rate) for rate in (self.clean, self.here)]
+        tests = ["–", "–"] if self.axis in NO_COST else [chance(self.p), chance(self.holm)]
+        gap = estimate_cell(self.difference, "+z.1f", PRINTED_OTHERWISE * self.found)
+        texts = map(TableCell, (*tests, f"{self.lost}/{self.won}"))
+        return TableRow(self.axis, (*rates, gap, *texts, *_hands(self.grounding)))
+
 
 @dataclass(frozen=True)
 class Reading:
@@ -86,51 +94,37 @@ class Reading:
 
 @dataclass(frozen=True)
 class Profile:
-    """The costs of all axes of a run by `metric`, in the run's order; `print` shows the tables."""
+    """The costs of all axes of a run by `metric`, in the run's order; `print` shows the tables.
+    `control` is what was chosen in clean scenes, by place."""
 
     metric: str
-    by: str
     control: Mapping[str, Grounding]
-    """What was chosen in clean scenes, by place."""
     costs: tuple[Cost, ...]
     readings: tuple[Reading, ...]
     missing: int = 0
 
-    def table(self) -> Table:
-        """Costs in percentage points."""
-        rows = []
-        places = dict.fromkeys(cost.place for cost in self.costs)
-        for place in sorted(places):
-            listed = [cost for cost in self.costs if cost.place == place]
-            rows += [TableRow(CATEGORY_NAMES.get(place, place), kind="section")] * bool(place)
-            own = self.control[place]
-            cells = (DASH,) * 6 + (*_hands(own), TableCell(str(own.trials)))
-            rows.append(TableRow(CLEAN, cells, "average"))
-            rows += [_row(cost) for cost in listed]
-        heads = ("clean", "here", "difference [95 %]", "p", "Holm", "lost/won", *HANDS)
-        notes = [NOTE] + [f"{self.missing} trials have no result: left out."] * bool(self.missing)
-        title = f"What each axis costs: {METRIC_NAMES[self.metric]} on equal seeds"
-        return Table("profile", title, "axis", heads, tuple(rows), notes=tuple(notes))
-
-    def reading_table(self) -> Table | None:
-        """What was taken when sentences had been changed; None where none were."""
-        if not self.readings:
-            return None
-        rows = [
-            TableRow(
-                r.axis,
-                (*map(estimate_cell, (r.taken, r.asked, r.before)), TableCell(str(r.trials))),
-            )
-            for r in self.readings
-        ]
-        heads = ("took something", "what is asked for", "what the clean sentence asks", "trials")
-        title = "Does it read? What was taken, in percent"
-        return Table("reading", title, "sentence", heads, tuple(rows), notes=(READING_NOTE,))
-
     @property
     def tables(self) -> list[Table]:
-        """Both."""
-        return [table for table in (self.table(), self.reading_table()) if table is not None]
+        """Costs in percentage points, and what was taken if sentences had been changed."""
+        rows = []
+        for place, own in self.control.items():
+            rows += [TableRow(CATEGORY_NAMES.get(place, place), kind="section")] * bool(place)
+            rows.append(TableRow(CLEAN, ((DASH,) * 6 + _hands(own)), "average"))
+            rows += [cost.row for cost in self.costs if cost.place == place]
+        lost = [f"{self.missing} trials have no result: left out."] * bool(self.missing)
+        title = f"What each axis costs: {METRIC_NAMES[self.metric]} on equal seeds"
+        made = [Table("profile", title, "axis", HEADS, tuple(rows), notes=(NOTE, *lost))]
+        if self.readings:
+            taken = [
+                TableRow(
+                    r.axis, (*map(estimate_cell, (r.taken, r.asked, r.before)), _count(r.trials))
+                )
+                for r in self.readings
+            ]
+            title = "Does it read? What was taken, in percent"
+            notes = (READING_NOTE,)
+            made.append(Table("reading", title, "sentence", READ, tuple(taken), notes=notes))
+        return made
 
     def to_json(self) -> dict[str, object]:
         """Plain JSON values; rates are fractions."""
@@ -143,7 +137,11 @@ class Profile:
         return "\n".join(table._repr_html_() for table in self.tables)
 
 
-HANDS = ("grounding", "execution", "trials")
+HEADS = (
+    *("clean", "here", "difference [95 %]", "p", "Holm", "lost/won"),
+    *("grounding", "execution", "trials"),
+)
+READ = ("took something", "what is asked for", "what the clean sentence asks", "trials")
 NOTE = (
     "Difference: under the axis minus clean, paired by seed; Holm: p corrected over this table, * "
     f"below {ALPHA:g}. Lost and won: pairs that succeeded in the clean scene alone, and under the "
@@ -157,23 +155,12 @@ READING_NOTE = (
 )
 
 
-def _row(cost: Cost) -> TableRow:
-    rates = [TableCell(f"{100 * rate:.1f}", 100 * rate) for rate in (cost.clean, cost.here)]
-    sign = PRINTED_OTHERWISE * cost.found
-    tests = ["–", "–"] if cost.axis in NO_COST else [_chance(cost.p), _chance(cost.holm)]
-    cells = (*rates, estimate_cell(cost.difference, "+z.1f", sign), *map(TableCell, tests))
-    flips = TableCell(f"{cost.lost}/{cost.won}")
-    return TableRow(
-        cost.axis, (*cells, flips, *_hands(cost.grounding), TableCell(str(cost.trials)))
-    )
+def _hands(found: Grounding) -> tuple[TableCell, ...]:
+    return estimate_cell(found.accuracy), estimate_cell(found.execution), _count(found.trials)
 
 
-def _hands(found: Grounding) -> list[TableCell]:
-    return [estimate_cell(found.accuracy), estimate_cell(found.execution)]
-
-
-def _chance(p: float) -> str:
-    return f"{p:.3f}" if p >= 0.0005 else "<.001"
+def _count(number: int) -> TableCell:
+    return TableCell(str(number), number)
 
 
 def profile_of(run: Run, metric: str = "sr1", by: str = "all") -> Profile:
@@ -184,48 +171,38 @@ def profile_of(run: Run, metric: str = "sr1", by: str = "all") -> Profile:
     """
     if by not in BY:
         raise ValueError(f"costs are told by {', '.join(BY)}, not by {by!r}")
-    modes = list(dict.fromkeys(key.mode for key in run.keys))
+    modes = dict.fromkeys(key.mode for key in run.keys)
     if CLEAN not in modes or len(modes) < 2:
         raise RunError(
             f"{run.folder} has no trials of an axis beside clean ones: run it with --profile"
         )
-    clean = {_place(k): r for k, r in run.records.items() if k.mode == CLEAN and finished(r)}
-    pairs: dict[str, list[Pair]] = {mode: [] for mode in modes if mode != CLEAN}
-    for key, record in run.records.items():
-        before = clean.get(_place(key))
-        if key.mode != CLEAN and before is not None and finished(record):
-            pairs[key.mode].append((before, record))
+    results = {key: record for key, record in run.records.items() if finished(record)}
+    clean = [record for key, record in results.items() if key.mode == CLEAN]
+    pairs = {
+        mode.removeprefix(PARTS): [
+            (own, other)
+            for own in clean
+            if (other := results.get(replace(own.key, mode=mode))) is not None
+        ]
+        for mode in modes
+        if mode != CLEAN
+    }
+    places = list(dict.fromkeys(map(BY[by], clean)))
     costs = [
-        cost
-        for mode, found in pairs.items()
-        for place, members in _grouped(found, by).items()
-        for cost in [_cost(mode.removeprefix(PARTS), place, members, metric)]
+        _cost(axis, place, members, metric)
+        for axis, found in pairs.items()
+        for place in places
+        if (members := [pair for pair in found if BY[by](pair[0]) == place])
     ]
     tested = [cost for cost in costs if cost.axis not in NO_COST]
-    chances = iter(holm([cost.p for cost in tested]))
-    costs = [cost if cost.axis in NO_COST else replace(cost, holm=next(chances)) for cost in costs]
-    control: dict[str, list[Tally]] = {}
-    for record in clean.values():
-        control.setdefault(BY[by](record.key, record.category), []).append(tally_of(record))
+    corrected = iter(holm([cost.p for cost in tested]))
     return Profile(
         metric,
-        by,
-        {place: summed(found) for place, found in control.items()},
-        tuple(costs),
-        tuple(_readings(clean.values(), pairs)),
-        sum(not finished(run.records.get(key)) for key in run.keys),
+        {p: summed([tally_of(r) for r in clean if BY[by](r) == p]) for p in places},
+        tuple(c if c.axis in NO_COST else replace(c, holm=next(corrected)) for c in costs),
+        tuple(_readings(clean, pairs)),
+        len(run.keys) - len(results),
     )
-
-
-def _place(key: TrialKey) -> tuple[object, ...]:
-    return key.task, key.level, key.seed, key.embodiment, key.split
-
-
-def _grouped(pairs: Sequence[Pair], by: str) -> dict[str, list[Pair]]:
-    found: dict[str, list[Pair]] = {}
-    for pair in pairs:
-        found.setdefault(BY[by](pair[0].key, pair[0].category), []).append(pair)
-    return found
 
 
 def _cost(axis: str, place: str, pairs: Sequence[Pair], metric: str) -> Cost:
@@ -237,24 +214,21 @@ def _cost(axis: str, place: str, pairs: Sequence[Pair], metric: str) -> Cost:
     return Cost(axis, place, len(pairs), clean, here, gap, lost, won, p, chosen)
 
 
-def _readings(clean: Iterable[TrialRecord], pairs: Mapping[str, Sequence[Pair]]) -> list[Reading]:
+def _readings(
+    clean: Iterable[TrialRecord], pairs: Mapping[str, Sequence[Pair]]
+) -> Iterable[Reading]:
     """How sentences that were changed on purpose were followed, after the clean ones."""
-    made = []
-    own = [(record, record) for record in clean]
-    changed = {m.removeprefix(PARTS): found for m, found in pairs.items()}
-    arms = [(a, changed[a]) for a in ("other-target", *NO_COST) if a in changed]
-    for axis, found in [(CLEAN, own), *arms] if arms else []:
+    arms = {axis: pairs[axis] for axis in ("other-target", *NO_COST) if axis in pairs}
+    for axis, found in ({CLEAN: [(r, r) for r in clean]} | arms if arms else {}).items():
         spatial = [pair for pair in found if pair[0].category not in PROCEDURAL]
-        if not spatial:
-            continue
-        asked = summed([tally_of(record) for _, record in spatial])
-        before = summed([_as_before(*pair) for pair in spatial])
-        taken = asked.no_choice
-        assert taken is not None, "a spatial trial is due one choice"
-        some = Estimate(1 - taken.value, 1 - taken.high, 1 - taken.low, taken.method)
-        right = None if axis in NO_COST else asked.accuracy
-        made.append(Reading(axis, len(spatial), some, right, before.accuracy))
-    return made
+        if spatial:
+            asked = summed([tally_of(record) for _, record in spatial])
+            before = summed([_as_before(*pair) for pair in spatial])
+            none = asked.no_choice
+            assert none is not None, "a spatial trial is due one choice"
+            taken = Estimate(1 - none.value, 1 - none.high, 1 - none.low, none.method)
+            right = None if axis in NO_COST else asked.accuracy
+            yield Reading(axis, len(spatial), taken, right, before.accuracy)
 
 
 def _as_before(clean: TrialRecord, record: TrialRecord) -> Tally:

@@ -258,6 +258,27 @@ def draw_bars(bars: Mapping[str, Mapping[str, Estimate]], label: str) -> Figure:
     return figure
 
 
+def draw_costs(costs: Mapping[str, tuple[Estimate, bool]]) -> Figure:
+    """The figure of differences of success by axis, the costliest first: filled where it is found
+    to be no chance."""
+    ranked = sorted(costs.items(), key=lambda item: -item[1][0].value)
+    figure = new_figure(0.13 * len(ranked) + 0.45)
+    axis = figure.subplots()
+    axis.axvline(0, color=INK, lw=0.6)
+    for place, (_, (found, sure)) in enumerate(ranked):
+        value, low, high = (100 * x for x in (found.value, found.low, found.high))
+        colour = COLOURS[1] if sure else COLOURS[0]
+        axis.plot([low, high], [place, place], color=colour, lw=0.9)
+        face = colour if sure else "#ffffff"
+        axis.plot([value], [place], "o", ms=3.4, color=colour, mfc=face, mew=0.9, clip_on=False)
+    axis.set_yticks(range(len(ranked)), [label_of(name) for name, _ in ranked])
+    axis.set_ylim(-0.6, len(ranked) - 0.4)
+    axis.set_xlabel("success under the axis minus clean [points]")
+    plain(axis, "x")
+    axis.tick_params(axis="y", length=0)
+    return figure
+
+
 FAILURE_LINE = 0.13
 """Height of a task's bar [inch]."""
 FILLS = (

@@ -142,7 +142,7 @@ class RunSettings(Struct, frozen=True):
     `policy` stands for all tasks where there are no `policies` by task. `privileged`: it sees the
     exact state. `needs_trial_key`: it is sent what names the scenes. `step_scale` multiplies the
     official step limits. `run_seed`: ids and policy seeds follow from it; a secret during the run,
-    unless it was given. `shuffled_instructions`: every trial has the sentence of another scene.
+    unless it was given.
     `salt_sha256` is of hidden scenes. `instructions`: hash of official sentences. `profile`: its
     trials measure what axes cost.
     """
@@ -156,7 +156,6 @@ class RunSettings(Struct, frozen=True):
     run_seed: RunSeed | Count = 0
     step_scale: Number = 1.0
     world: WorldSettings = WorldSettings()
-    shuffled_instructions: bool = False
     clock: ClockSettings | None = None
     salt_sha256: str = ""
     policies: dict[str, PolicySettings] = {}
@@ -334,9 +333,6 @@ def departures(manifest: RunManifest) -> tuple[Departure, ...]:
     elif settings.needs_trial_key or any(stated.needs_trial_key for stated in settings.stated):
         words = "is sent every trial's seed, from which the scene can be rebuilt"
         found.append(Departure("knows seeds", words))
-    if settings.shuffled_instructions:
-        words = "an ablation, every trial has the sentence of another scene"
-        found.append(Departure("shuffled sentences", words))
     if settings.profile:
         found.append(Departure("profile", "trials of what axes cost, beside clean ones"))
     if manifest.clock:
@@ -350,10 +346,7 @@ def departures(manifest: RunManifest) -> tuple[Departure, ...]:
     return tuple(found)
 
 
-OPTIONAL_SETTINGS = (
-    *("shuffled_instructions", "clock", "salt_sha256", "policies", "instructions", "layout"),
-    *("profile",),
-)
+OPTIONAL_SETTINGS = (*("profile", "clock", "salt_sha256", "policies", "instructions", "layout"),)
 OPTIONAL_ABOUT = ("git", "policy", "policies", "arguments", "seeds", "instructions")
 
 

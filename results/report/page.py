@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from robospa.results.failures.labels import NAMES, SIMULATED_PER_FILM
 from robospa.results.figures.charts import chance_levels
+from robospa.results.figures.draw import draw_profile
 from robospa.results.figures.series import COLOURS, FORMATS, GRID, INK, DrawnFigure, spread
 from robospa.results.paper.origin import origin_of
 from robospa.results.records.action_problems import problem_data
@@ -305,6 +306,8 @@ def write_report(report: Report, folder: Path) -> Path:
     """Write `report` into `folder` and return it."""
     (folder / FIGURES).mkdir(parents=True, exist_ok=True)
     drawings = draw_figures(report.runs, report.columns, folder / FIGURES, failures=report.failures)
+    for number, found in enumerate(report.profiles, 1):
+        drawings += draw_profile(found, folder / FIGURES, number)
     write_files(report.tables, folder / TABLES_FOLDER)
     (folder / "report.md").write_text(markdown(report), encoding="utf-8")
     (folder / "report.json").write_text(json.dumps(to_data(report), indent=1) + "\n")

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from robospa.results.comparison.compare import by_axis
+from robospa.results.comparison.profile import CLEAN, Profile, profile_of
 from robospa.results.failures.labels import Failure, distribution, failures_of
 from robospa.results.figures.draw import draw
 from robospa.results.figures.series import FORMATS, DrawnFigure, Series
@@ -39,6 +40,7 @@ class Report:
 
     `models` are the runs, then published models, over the variants that the runs have; `shared` are
     the same over the variants that all have. `banner` is what to know before they are compared.
+    Of a run of axes `runs` has the clean trials alone, and `profiles` what the axes cost.
     `failures` has the type of every failed trial of each run, `findings` is the output of `robospa
     lint`. `columns` and `tables` are empty where the runs cannot stand in one table.
     """
@@ -53,6 +55,7 @@ class Report:
     missing: Sequence[str]
     findings: Sequence[str]
     method: Sequence[str]
+    profiles: Sequence[Profile] = ()
 
     @property
     def named_runs(self) -> list[tuple[str, Run]]:
@@ -69,7 +72,9 @@ def make_report(
     to stand beside them, `ci` is one of `intervals.METHODS`.
     """
     whole = [runs] if isinstance(runs, Run) else list(runs)
-    runs = [part for run in whole for part in by_setting(run)]
+    profiles = [profile_of(run) for run in whole if run.manifest.settings.profile]
+    parts = [part for run in whole for part in by_setting(run)]
+    runs = [p for p in parts if not p.manifest.settings.profile or p.keys[0].mode == CLEAN]
     own = [results_of_run(run, name, ci) for run, name in zip(runs, names_of(runs), strict=True)]
     others = [beside_runs(results_beside_runs(model, ci), own) for model in published]
     models = [*own, *others]
@@ -80,7 +85,7 @@ def make_report(
         over_shared(models),
         banners(models),
         columns,
-        _tables(own, columns),
+        [ReportTable(t, False) for p in profiles for t in p.tables] + _tables(own, columns),
         [failures_of(run.records.values()) for run in runs],
         [
             f"{model.name}: {line}" if len(runs) > 1 else line
@@ -93,6 +98,7 @@ def make_report(
         ],
         [*refused, *findings(whole)],
         [origin_of(own), *method_notes(columns)],
+        profiles,
     )
 
 

@@ -77,7 +77,7 @@ def about(run: Run) -> dict[str, object]:
         "policy": manifest.policy.name or "unknown",
         "privileged": settings.privileged,
         "needs_trial_key": settings.needs_trial_key,
-        "shuffled_instructions": settings.shuffled_instructions,
+        "profile": settings.profile,
         "seeded": bool(manifest.policy.seeded),
         "spec": settings.policy.spec,
         "trials": len(run.keys),

@@ -17,7 +17,7 @@ import numpy as np
 from robospa.registry import did_you_mean
 from robospa.tasks.modes import Part, with_table_raised
 from robospa.tasks.modes.clutter import clutter, look_alikes
-from robospa.tasks.modes.wording import other_target
+from robospa.tasks.modes.wording import REWORDED, other_target
 from robospa.tasks.scene import SEEN, TEXTURES, UNSEEN, WHITE, Lights, Scene, Texture
 from robospa.tasks.shapes import Color
 
@@ -115,17 +115,12 @@ def _elsewhere(scene: Scene, part: Part, strength: float, textures: str) -> Scen
     return scene
 
 
-def _axis(of: str, name: str, *profile: float, most: float, whole: bool = False) -> Variation:
-    """A part whose usual strength is the middle one of its profile."""
-    usual = profile[len(profile) // 2]
-    return Variation(name, usual, most, _elsewhere, whole, False, profile=profile, of=of)
-
-
-def _words(name: str, draw: Callable[[Scene, Part, float, str], Scene] = _elsewhere) -> Variation:
-    return Variation(name, 1.0, 1.0, draw, True, False, profile=(1.0,), of="words")
-
-
-REPEAT = Variation("repeat", 1.0, 1.0, _elsewhere, True, False, profile=(1.0,), of="")
+def _axis(of: str, name: str, *profile: float, most: float = 1, whole: bool = True) -> Variation:
+    """A part that is not in the scene, usually of the middle strength of its profile."""
+    profile = profile or (1.0,)
+    return Variation(
+        name, profile[len(profile) // 2], most, _elsewhere, whole, False, profile=profile, of=of
+    )
 
 
 VARIATIONS = {
@@ -138,23 +133,24 @@ VARIATIONS = {
         Variation("camera", 0.02, 0.1, _camera, official=False, profile=(0.02, 0.05)),
         Variation("white-table", 1.0, 1.0, _white_table, whole=True, official=False),
         Variation("look-alikes", 2.0, 5.0, _look_alikes, True, False, True, profile=(2.0,)),
-        _axis("eyes", "blur", 1, 2, 4, most=10),
-        _axis("eyes", "noise", 10, 20, 40, most=100),
-        _axis("eyes", "jpeg", 80, 95, most=99, whole=True),
-        _axis("eyes", "bright", 1, 2, most=4),
-        _axis("eyes", "dark", 1, 2, most=4),
-        _axis("eyes", "grey", 1, most=1, whole=True),
-        _axis("eyes", "wrist-shift", 8, 16, most=80, whole=True),
-        _axis("eyes", "no-wrists", 1, most=1, whole=True),
-        _axis("hands", "start", 2, 5, most=20),
-        _axis("hands", "action-noise", 2, 5, 10, most=50),
-        _axis("hands", "action-bias", 5, 10, most=50),
-        _axis("hands", "latency", 100, 200, 400, most=10_000),
-        *map(_words, ("other-words", "other-order", "short", "long", "indirect", "lower-case")),
-        _axis("words", "typos", 1, 3, most=20, whole=True),
-        *map(_words, ("no-sentence", "nothing-here")),
-        _words("other-target", _other_target),
-        REPEAT,
+        _axis("eyes", "blur", 1, 2, 4, most=10, whole=False),
+        _axis("eyes", "noise", 10, 20, 40, most=100, whole=False),
+        _axis("eyes", "jpeg", 80, 95, most=99),
+        _axis("eyes", "bright", 1, 2, most=4, whole=False),
+        _axis("eyes", "dark", 1, 2, most=4, whole=False),
+        _axis("eyes", "grey"),
+        _axis("eyes", "wrist-shift", 8, 16, most=80),
+        _axis("eyes", "no-wrists"),
+        _axis("hands", "start", 2, 5, most=20, whole=False),
+        _axis("hands", "action-noise", 2, 5, 10, most=50, whole=False),
+        _axis("hands", "action-bias", 5, 10, most=50, whole=False),
+        _axis("hands", "latency", 100, 200, 400, most=10_000, whole=False),
+        *(_axis("words", name) for name in REWORDED[:-1]),
+        _axis("words", "typos", 1, 3, most=20),
+        *(_axis("words", name) for name in ("indirect", "no-sentence", "nothing-here")),
+        _axis("words", "other-scene"),
+        replace(_axis("words", "other-target"), draw=_other_target),
+        _axis("", "repeat"),
     )
 }
 """By name, in the order in which they are applied: clutter stands on the table as it is then."""

@@ -10,14 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from robospa.geometry import Vec3
 from robospa.tasks.scene import Scene, SceneObject
 
-Facts = Mapping[str, Any]
+Facts = Mapping[str, object]
 
 
 def other_target(scene: Scene, rng: np.random.Generator) -> Scene:

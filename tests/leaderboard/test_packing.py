@@ -130,7 +130,7 @@ def older(settings: Changed, about: Changed) -> None:
     ("change", "words"),
     [
         (setting("privileged", True), "privileged"),
-        (setting("shuffled_instructions", True), "ablation"),
+        (setting("profile", True), "what axes cost"),
         (setting("step_scale", 2.0), "step limits"),
         (setting("run_seed", 7), "the run's seed, 7, was given"),
         (setting("world", {"name": "my.world:Easy"}), "another world"),

@@ -43,6 +43,8 @@ def test_rewordings_are_sentences_of_the_scene_and_follow_from_its_seed() -> Non
     assert sorted(own) == sorted(wrong)
     assert said("no-sentence") == "" and said("nothing-here") != own
     assert "mug" not in said("nothing-here")
+    strange = {said("other-scene", seed) for seed in range(100_000, 100_008)}
+    assert len(strange) == 8 and own not in strange and said("other-scene") == said("other-scene")
 
 
 def test_axes_are_named_one_by_one_in_groups_or_all() -> None:
