@@ -6,7 +6,7 @@ Importing this registers every task.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -67,23 +67,20 @@ class RoboSPA(ir.EmbodimentBase):
 
     def reset(self, scene: ir.Scene, *, seed: int | None = None) -> ir.Observation:
         """The scene's accepted seed decides all; `seed` is what inspect-robots makes of it."""
-        if "level" not in scene.metadata:
-            raise ConfigError(f"{scene.id!r} is no scene of RoboSPA: choose --task robospa/...")
+        key = _key_of(scene, self._robot)
         self.close()
-        task, level = scene.metadata["task"], scene.metadata["level"]
-        self._env = TaskEnv(task, level, embodiment=self._robot, cameras=CAMERAS, size=self._size)
-        return _observation(self._env.reset(seed=scene.init_seed)[0])
+        self._env = TaskEnv(
+            key.task, key.level, embodiment=key.embodiment, cameras=CAMERAS, size=self._size
+        )
+        return _observation(self._env.reset(seed=key.seed)[0])
 
     def step(self, action: ir.Action) -> ir.StepResult:
-        """`info` of the last step has the trial's scores and the digests of our record."""
+        """`info` of the last step has the digests of our record."""
         assert self._env is not None
         seen, reward, terminated, truncated, info = self._env.step(np.float32(action.data))
         record, trial = self._env.record, self._env.trial
         if record is not None and trial is not None:
             info["sr1"] = first_choice(record)
-            info["ps"] = record.done / max(1, record.total)
-            if record.candidates > 1:
-                info["onta"] = onta_of_bound(record.success, record.candidates)
             if self._out:
                 (self._out / "actions").mkdir(parents=True, exist_ok=True)
                 write_actions(self._out, record.key, np.stack(trial.actions), "joint")
@@ -94,6 +91,14 @@ class RoboSPA(ir.EmbodimentBase):
         """Close the simulator."""
         if self._env is not None:
             self._env.close()
+
+
+def _key_of(scene: ir.Scene, robot: str) -> TrialKey:
+    where = scene.metadata
+    if where.get("robot") != robot:
+        wanted = f"--task robospa/... -T robot={robot}"
+        raise ConfigError(f"{scene.id!r} is no scene of RoboSPA for {robot}: choose {wanted}")
+    return TrialKey(where["task"], where["level"], scene.init_seed or 0, robot)
 
 
 def _observation(seen: dict[str, object]) -> ir.Observation:
@@ -119,6 +124,8 @@ class Served(ir.PolicyBase):
     def bind(self, embodiment_info: ir.EmbodimentInfo) -> None:
         """Refuse pictures of another size: nothing is scaled on the way."""
         self._robot = embodiment_info.name.partition(":")[2]
+        if self._spec.action_dim is None:
+            self.info = replace(self.info, action_space=embodiment_info.action_space)
         given = embodiment_info.observation_space.cameras
         if wrong := [one for one in self.info.observation_space.cameras if one not in given]:
             size = f"-E width={wrong[0].width} -E height={wrong[0].height}"
@@ -128,13 +135,19 @@ class Served(ir.PolicyBase):
 
     def reset(self, scene: ir.Scene) -> None:
         """Begin the trial."""
-        where = scene.metadata
-        key = TrialKey(where["task"], where["level"], scene.init_seed or 0, self._robot)
+        key = _key_of(scene, self._robot)
         shown = key if self._spec.needs_trial_key else None
-        seed = policy_seed(key, 0)
-        self._policy.reset(
-            robospa.TrialInfo(key.task, self._robot, scene.instruction, seed, scene.id, shown)
+        left, right = (len(arm.joints) for arm in robot_named(self._robot).arms)
+        trial = robospa.TrialInfo(
+            key.task,
+            self._robot,
+            scene.instruction,
+            policy_seed(key, 0),
+            id=scene.id,
+            key=shown,
+            joints=(left, right),
         )
+        self._policy.reset(trial)
 
     def act(self, observation: ir.Observation) -> ir.ActionChunk:
         """The actions that are executed before the next query."""
@@ -152,27 +165,35 @@ class Served(ir.PolicyBase):
 
 @dataclass(frozen=True)
 class FromRecord:
-    """A score of our record, from the last step's `info`."""
+    """`sr1`, `ps` or `onta` (among so many `candidates`) by the last step's `info`; a trial that a
+    policy gave up has failed."""
 
     name: str
+    candidates: int = 0
 
     def __call__(self, record: ir.TrialRecord, target: ir.Target | None) -> ir.Score:
-        """0 for a trial that never ended."""
+        """The score, and how the trial ended."""
         info = record.steps[-1].result.info if record.steps else {}
-        return ir.Score(info.get(self.name, 0.0), f"ended by {info.get('end') or 'an error'}")
+        value = info.get("sr1", False)
+        if self.name == "ps":
+            value = info.get("done", 0) / max(1, info.get("total", 1))
+        elif self.name == "onta":
+            value = onta_of_bound(info.get("success", False), self.candidates)
+        return ir.Score(value, f"ended by {info.get('end') or record.termination_reason}")
 
 
 def variant(task: str, level: int, trials: int = 100, robot: str = REFERENCE) -> ir.Task:
     """The first `trials` accepted seeds of a variant."""
     seeds = find_list(ListKey(task, level, robot, "clean")).seeds[:trials]
-    where = {"task": task, "level": level}
+    where = {"task": task, "level": level, "robot": robot}
     scenes = []
     for seed in seeds:
         text = task_parts(TrialKey(task, level, seed, robot)).instruction
         scenes.append(ir.Scene(str(seed), text, init_seed=seed, metadata=where))
     found = find_task(task)
-    names = ("sr1", *(["onta"] if found.dimension == "spatial" else ["ps"]))
-    scorers = ["success_at_end", *map(FromRecord, names)]
+    candidates = found.levels[level].candidates
+    other = FromRecord("onta", candidates) if candidates > 1 else FromRecord("ps")
+    scorers = ["success_at_end", FromRecord("sr1"), other]
     return ir.Task(_name(task, level), scenes, scorers, max_steps=step_limit(found, level))
 
 
