@@ -191,8 +191,8 @@ def variant(task: str, level: int, trials: int = 100, robot: str = REFERENCE) ->
         text = task_parts(TrialKey(task, level, seed, robot)).instruction
         scenes.append(ir.Scene(str(seed), text, init_seed=seed, metadata=where))
     found = find_task(task)
-    candidates = found.levels[level].candidates
-    other = FromRecord("onta", candidates) if candidates > 1 else FromRecord("ps")
+    name = "onta" if found.dimension == "spatial" else "ps"
+    other = FromRecord(name, found.levels[level].candidates)
     scorers = ["success_at_end", FromRecord("sr1"), other]
     return ir.Task(_name(task, level), scenes, scorers, max_steps=step_limit(found, level))
 
