@@ -10,6 +10,7 @@ defaults are openpi's own; `presets.json` has those of other projects, and a TOM
 and a server that does not know it is taken for openpi's.
 """
 
+import contextlib
 import json
 import math
 import time
@@ -45,12 +46,6 @@ from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.transport import Transport
 from robospa.schema import convert, parse_json
 
-WARNINGS = (
-    "adapt_to_pi is invisible on the wire: the served config must have adapt_to_pi=False for "
-    "data in RoboTwin's conventions, or joint signs and grippers will be wrong",
-    "openpi's sampling noise depends on the order of requests and cannot be seeded from here: two "
-    "runs will differ",
-)
 REMARKS = ("state", "policy_timing", "server_timing")
 """What an answer may have beside the actions: the state as the model read it, and times."""
 
@@ -59,8 +54,8 @@ REMARKS = ("state", "policy_timing", "server_timing")
 class FamilyOptions(ChunkOptions):
     """What a server of this family does not say."""
 
-    cameras: str = option("head,left_wrist,right_wrist", "our cameras to send, comma separated")
-    names: str = option("", "other camera names at the server, such as head:cam_top,front:cam_low")
+    cameras: str = option("head,left_wrist,right_wrist", "our cameras to send")
+    names: str = option("", "other camera names there, such as head:cam_top,front:cam_low")
     state: str = option("commanded", "which joints to send", ("commanded", "measured"))
     action_dim: int = option(
         ActionSpace().width, "columns of a chunk: 16 for two arms of seven joints"
@@ -72,10 +67,10 @@ class FamilyOptions(ChunkOptions):
     )
     committed: str = option(
         "",
-        "for a server that does real-time chunking: its names of the committed actions and the "
-        "delay, such as prev_chunk_left_over,inference_delay; empty: not sent",
+        "for real-time chunking: the server's names of the committed actions and the delay, such "
+        "as prev_chunk_left_over,inference_delay; empty: not sent",
     )
-    extra: str = option("{}", "JSON map sent along at the top level of every observation")
+    extra: str = option("{}", "JSON map sent with every observation")
     inside: str = option("", "where the observation goes in a message, such as examples/0")
     images: str = option("images", "name of the pictures: a map; with [] a list; empty: one by one")
     layout: str = option("chw", "axes of a picture, uint8 RGB", ("chw", "hwc"))
@@ -85,7 +80,7 @@ class FamilyOptions(ChunkOptions):
     actions: str = option("actions", "where an answer has the actions; empty: it is the actions")
     order: tuple[int, ...] = option(
         (),
-        "in a file: the server's column of each of our numbers, of joints too, as [0, 1, 2]",
+        "in a file, as [0, 1, 2]: the server's column of each of our numbers, in joints too",
     )
     reset: str = option("{}", "JSON map sent when a trial begins, which is answered; {}: none")
     idle: Annotated[float, Meta(ge=0)] = option(
@@ -199,28 +194,34 @@ def _json_map(name: str, text: str) -> dict[str, object]:
     return found
 
 
-def _averaged(rows: NDArray[np.float32], new: int) -> NDArray[np.float32]:
-    """`rows` (N, W, C) as `new` rows, each the mean of N / new; summed one after another, as OpenCV
-    does it, so that no value is rounded another way."""
+def _averaged(image: NDArray[np.uint8 | np.float32], new: int) -> NDArray[np.float32]:
+    """The rows of `image` (N, W, C) as `new` columns (W, new, C), each the mean of N / new; summed
+    one after another, as OpenCV does it, so that no value is rounded another way."""
+    rows = image.astype(np.float32).reshape(len(image), -1)
     scale = len(rows) / new
-    start, mean = np.arange(new) * scale, np.zeros((new, *rows.shape[1:]), np.float32)
+    start, mean = np.arange(new) * scale, np.zeros((new, rows.shape[1]), np.float32)
     for tap in range(math.ceil(scale) + 1):
         row = np.floor(start).astype(int) + tap
-        share = (
-            np.clip(np.minimum(start + scale, row + 1) - np.maximum(start, row), 0, None) / scale
-        )
-        mean += rows[np.minimum(row, len(rows) - 1)] * share.astype(np.float32)[:, None, None]
-    return mean
+        share = (np.minimum(start + scale, row + 1) - np.maximum(start, row)).clip(0) / scale
+        part = rows[np.minimum(row, len(rows) - 1)]
+        part *= share.astype(np.float32)[:, None]
+        mean += part
+    return np.ascontiguousarray(mean.reshape(new, *image.shape[1:]).swapaxes(0, 1))
 
 
 def shrunk(image: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
     """`image` (H, W, 3) as (size, size, 3): each new pixel is the mean of the area that it covers,
-    as of OpenCV's INTER_AREA. Raises EncodeError for one that would have to grow."""
+    by OpenCV where it is installed, else to the same bits. Raises EncodeError for one that would
+    have to grow."""
     if size > min(image.shape[:2]):
         raise EncodeError(f"a picture of shape {image.shape} cannot be shrunk to size={size}")
-    across = _averaged(image.swapaxes(0, 1).astype(np.float32), size).swapaxes(0, 1)
+    with contextlib.suppress(ImportError):
+        import cv2
+
+        return np.asarray(cv2.resize(image, (size, size), interpolation=cv2.INTER_AREA))
+    across = _averaged(np.ascontiguousarray(image.swapaxes(0, 1)), size)
     small: NDArray[np.uint8] = np.rint(_averaged(across, size)).astype(np.uint8)
-    return small
+    return np.ascontiguousarray(small.swapaxes(0, 1))
 
 
 def reason_of(answer: Mapping[str, object]) -> str:
@@ -260,7 +261,9 @@ class Preset:
         return name in metadata and value in ("", metadata[name])
 
 
-OPENPI = Preset("an openpi server", warnings=WARNINGS)
+PRESETS = convert(
+    parse_json(Path(__file__).with_name("presets.json").read_text()), dict[str, Preset]
+)
 
 
 class FamilySession(StatelessSession):
@@ -278,9 +281,9 @@ class FamilySession(StatelessSession):
         options: FamilyOptions,
         params: ConnectionParams,
         name: str = "openpi",
-        preset: Preset = OPENPI,
         transport: Transport | None = None,
     ) -> None:
+        preset = PRESETS[name]
         self._connect, self._options, self._preset = connect, options, preset
         self._timeouts, self._limits = params.timeouts, params.limits
         self._used = time.monotonic()
@@ -304,11 +307,8 @@ class FamilySession(StatelessSession):
         return metadata
 
     def reset(self, id: int, trial: TrialInfo) -> None:
-        if self._options.maps["reset"]:
-            answer = self._ask(
-                self._options.maps["reset"], self._timeouts.reset, "a reset's answer"
-            )
-            self._check(answer)
+        if begin := self._options.maps["reset"]:
+            self._check(self._ask(begin, self._timeouts.reset, "an answer to a reset"))
 
     def infer(
         self, id: int, observation: Observation, timeout: float
@@ -317,8 +317,10 @@ class FamilySession(StatelessSession):
         answer = self._ask(request, timeout, "actions")
         if self._options.actions and not isinstance(answer, Mapping):
             raise self._violation(": actions is not a map")
-        self._check(answer)
-        return self._options.chunk(answer), _timing(answer)
+        chunk = self._options.chunk(answer)
+        if not isinstance(chunk, np.ndarray):
+            self._check(answer)
+        return chunk, _timing(answer)
 
     def close(self) -> None:
         self._transport.close()
@@ -375,22 +377,29 @@ def _timing(answer: object) -> dict[str, float]:
 DECIDING_OPTIONS = {"measured state": "state", "arms swapped": "order"}
 
 
-def dialect(
-    name: str, preset: Preset, options: type[FamilyOptions] = FamilyOptions, **more: Any
-) -> Dialect:
-    """The dialect `name://` of the servers of one `preset`; `more` are other fields of it."""
+def dialect(name: str, **more: Any) -> Dialect:
+    """The dialect `name://` of a preset, whose options have the defaults given there; `more` are
+    other fields of it."""
+    preset = PRESETS[name]
+    chosen = read_options(FamilyOptions, preset.options)
+    hints = get_type_hints(FamilyOptions, include_extras=True)
+    changed = [
+        (f.name, hints[f.name], option(getattr(chosen, f.name), **f.metadata))
+        for f in fields(FamilyOptions)
+        if f.name in preset.options
+    ]
     said = " = ".join(filter(None, preset.greeting))
 
-    def open_session(params: ConnectionParams, chosen: FamilyOptions) -> FamilySession:
+    def open_session(params: ConnectionParams, options: FamilyOptions) -> FamilySession:
         address = replace(params.websocket_address(), token_kind="Api-Key")
         if not params.endpoint.path.strip("/"):
             address = replace(address, url=address.url.rstrip("/") + preset.path)
         connect = partial(Transport, address, params.timeouts, params.limits, None)
-        return FamilySession(connect, chosen, params, name, preset)
+        return FamilySession(connect, options, params, name)
 
     def recognise(probe: Probe) -> bool:
         """By its greeting, of which other servers may have one too."""
-        open_session(probe.params, options()).close()
+        open_session(probe.params, chosen).close()
         return True
 
     return Dialect(
@@ -398,9 +407,9 @@ def dialect(
         scheme=name,
         wire="websocket",
         port=preset.port,
-        options=options,
+        options=make_dataclass(name, changed, bases=(FamilyOptions,), frozen=True),
         open_session=open_session,
-        recognise=recognise if said or preset is OPENPI else None,
+        recognise=recognise,
         sign=f"its greeting has {said}" if said else "it greets unasked, with a map",
         deciding_options=DECIDING_OPTIONS,
         shared_state=preset.shared_state,
@@ -408,25 +417,11 @@ def dialect(
     )
 
 
-def preset_dialect(name: str) -> Dialect:
-    """The dialect `name://` of `presets.json`, whose options have the defaults given there."""
-    chosen = read_options(FamilyOptions, PRESETS[name].options)
-    hints = get_type_hints(FamilyOptions, include_extras=True)
-    changed = [
-        (f.name, hints[f.name], option(getattr(chosen, f.name), **f.metadata))
-        for f in fields(FamilyOptions)
-        if f.name in PRESETS[name].options
-    ]
-    options = make_dataclass(f"{name}Options", changed, bases=(FamilyOptions,), frozen=True)
-    return dialect(name, PRESETS[name], options)
-
-
-PRESETS = convert(
-    parse_json(Path(__file__).with_name("presets.json").read_text()), dict[str, Preset]
-)
-STARVLA, VLLM, LINGBOT = map(preset_dialect, ("starvla", "vllm", "lingbot"))
-DIALECT = dialect("openpi", OPENPI, weak_sign=True, also_reaches=("ws",))
+DIALECT = dialect("openpi", weak_sign=True, also_reaches=("ws",))
 """Our own server also answers an openpi client."""
+STARVLA, VLLM = dialect("starvla"), dialect("vllm")
+LINGBOT = replace(dialect("lingbot"), recognise=None)
+"""It greets as openpi's server does."""
 
 
 def open_ours(params: ConnectionParams, options: FamilyOptions) -> WireClient:
@@ -434,12 +429,11 @@ def open_ours(params: ConnectionParams, options: FamilyOptions) -> WireClient:
     out to speak openpi's: ours tells everything."""
     address, timeouts, limits = params.websocket_address(), params.timeouts, params.limits
     connect = partial(Transport, address, timeouts, limits, None)
-    return open_wire(
-        address,
-        timeouts,
-        limits,
-        lambda transport: FamilySession(connect, options, params, transport=transport),
-    )
+
+    def other(transport: Transport) -> FamilySession:
+        return FamilySession(connect, options, params, transport=transport)
+
+    return open_wire(address, timeouts, limits, other)
 
 
 def recognise_ours(probe: Probe) -> bool:

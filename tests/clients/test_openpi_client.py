@@ -27,7 +27,7 @@ from standins import (
 )
 
 from robospa.action_space import ActionSpace
-from robospa.clients import connect, openpi
+from robospa.clients import connect, openpi, openpi_family
 from robospa.clients.openpi_family import FamilyOptions
 from robospa.harness.running.policy_probe import probe
 from robospa.harness.running.request import client_options
@@ -399,6 +399,14 @@ def test_starvla_is_asked_and_read_in_its_own_order() -> None:
     joints = np.concatenate([STATE[:6], STATE[7:13], STATE[[6, 13]]])
     assert np.array_equal(asked["state"], joints[None])
     assert float(asked["image"][0][0, 0, 2]) == image(HEAD)[0, 0, 2]
+
+
+def test_pictures_are_shrunk_to_the_bits_of_opencv(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("cv2")
+    noise = np.random.default_rng(0).integers(0, 256, (240, 320, 3), np.uint8)
+    theirs = openpi_family.shrunk(noise, 224)
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    assert np.array_equal(openpi_family.shrunk(noise, 224), theirs)
 
 
 def test_a_server_that_cannot_answer_is_refused_before_the_first_trial() -> None:
