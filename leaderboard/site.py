@@ -6,20 +6,16 @@ submissions on equal seeds are compared by a script that is loaded when they are
 and texts are escaped by Jinja or become text nodes. Refuses to write into a folder of other things.
 """
 
-import hashlib
 import json
 import shutil
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from statistics import NormalDist
 
-from msgspec.json import encode
-
 from robospa.harness.running.atomic_file import replace_file
-from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.agreement import CELL_LIE
 from robospa.leaderboard.bundle import IN_REPOSITORY, BundleError
 from robospa.leaderboard.entries import (
@@ -40,7 +36,7 @@ from robospa.results.figures.draw import draw
 from robospa.results.figures.series import COLOURS, DrawnFigure, Series
 from robospa.results.paper.origin import DIFFERENCES, ORIGIN
 from robospa.results.paper.published import load
-from robospa.results.report.page import FIGURES, card, figure, own_version, render
+from robospa.results.report.page import FIGURES, card, figure, render
 from robospa.results.report.tables import ReportTable, for_page, method_notes, report_tables
 from robospa.results.report.trials import FailureCount, put
 from robospa.results.scoring.grounding import Grounding, table_of
@@ -248,21 +244,9 @@ def _chosen(entry: Entry) -> Mapping[str, Grounding]:
 
 
 def _figures(entry: Entry, folder: Path) -> list[DrawnFigure]:
-    """Draw the entry's figures, unless the folder holds those of the same values already."""
-    values = [page_values(entry), entry.failures, _chosen(entry), entry.name, own_version()]
-    state = hashlib.sha256(encode(values, order="deterministic")).hexdigest()
-    kept = folder / "drawn.json"
-    if kept.exists():
-        known = json.loads(kept.read_text(encoding="utf-8"))
-        if known["state"] == state:
-            return [DrawnFigure(**one) for one in known["drawings"]]
-    series = Series(
-        entry.name, entry.column.scores, failures=entry.failures, grounding=_chosen(entry)
-    )
-    made = draw([series], folder, FORMATS)
-    found = {"state": state, "drawings": [asdict(drawing) for drawing in made]}
-    replace_file(kept, json.dumps(found).encode())
-    return made
+    chosen, scores = _chosen(entry), entry.column.scores
+    series = Series(entry.name, scores, failures=entry.failures, grounding=chosen)
+    return draw([series], folder, FORMATS)
 
 
 FOLDER = "pairs"
@@ -296,23 +280,15 @@ def write_pairs(pairs: Sequence[Pair], out: Path, note: Callable[[str], None]) -
     first: tuple[str, ModelResults] | None = None
     for one, two in pairs:
         path = out / FOLDER / one.slug / f"{two.slug}.js"
-        state = f"// {_state(one)} {_state(two)} {own_version()}\n"
-        if path.is_file() and path.read_text(encoding="utf-8").startswith(state):
-            continue
         note(f"{one.name} and {two.name} on equal seeds")
         if first is None or first[0] != one.slug:
             first = one.slug, _results(one)
         key = json.dumps(f"{one.slug}/{two.slug}")
         rows = json.dumps(paired(first[1], _results(two)), separators=(",", ":"))
-        replace_file(path, f"{state}pairLoaded({key}, {rows});\n".encode())
+        replace_file(path, f"pairLoaded({key}, {rows});\n".encode())
 
 
 def _results(entry: Entry) -> ModelResults:
     kept = entry.submission
     assert kept is not None
     return results_of(entry.name, kept.outcomes, kept.run)
-
-
-def _state(entry: Entry) -> str:
-    assert entry.submission is not None
-    return layout.sha256(str(entry.submission.bundle).encode())

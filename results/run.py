@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Mapping
 from dataclasses import fields
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,7 +28,6 @@ from robospa.results.scoring.grounding import Grounding, Place, groundings, tall
 from robospa.results.scoring.models import results_of_run
 from robospa.results.scoring.scores import Scores, score_run
 from robospa.results.tables import Table
-from robospa.trial import TrialKey
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -146,14 +146,10 @@ FLAGS: Mapping[str, Callable[[TrialRecord], Cell]] = {
     "asked_again": asked_again,
 }
 TEXTS: Mapping[str, Callable[[TrialRecord], Cell]] = {
-    "category": lambda record: record.category,
-    "instruction": lambda record: record.instruction,
+    **{name: attrgetter(name) for name in ("category", "instruction")},
     "failure": _failure,
     "evidence": _evidence,
-    "message": lambda record: record.message,
-    "video": lambda record: record.video,
-    "digest": lambda record: record.digest,
-    "actions_digest": lambda record: record.actions_digest,
+    **{name: attrgetter(name) for name in ("message", "video", "digest", "actions_digest")},
 }
 NUMBERS: Mapping[str, Callable[[TrialRecord], Cell]] = {
     "progress": lambda record: record.done / record.total if record.total else None,
@@ -187,14 +183,15 @@ def trial_columns(run: Run) -> dict[str, list[Cell]]:
     Columns: the fields of the key, `end`, FLAGS, COUNTS, PROBLEMS, CHOICES, NUMBERS, TEXTS. A trial
     without a result (`end` is "infrastructure" or "not run") has None in all but its key.
     """
-    records = [_result(run, key) for key in run.keys]
+    known = [run.records.get(key) for key in run.keys]
+    records = [record if finished(record) else None for record in known]
     columns: dict[str, list[Cell]] = {
         name: [getattr(key, name) for key in run.keys] for name in KEY_COLUMNS
     }
-    columns["end"] = [_end(run, key) for key in run.keys]
+    columns["end"] = [NOT_RUN if record is None else record.end for record in known]
     fields: dict[str, Callable[[TrialRecord], Cell]] = {
         **FLAGS,
-        **{name: _count(name) for name in COUNTS},
+        **{name: attrgetter(name) for name in COUNTS},
         **PROBLEMS,
         **CHOICES,
         **NUMBERS,
@@ -203,17 +200,3 @@ def trial_columns(run: Run) -> dict[str, list[Cell]]:
     for name, value in fields.items():
         columns[name] = [None if record is None else value(record) for record in records]
     return columns
-
-
-def _count(name: str) -> Callable[[TrialRecord], Cell]:
-    return lambda record: int(getattr(record, name))
-
-
-def _result(run: Run, key: TrialKey) -> TrialRecord | None:
-    record = run.records.get(key)
-    return record if finished(record) else None
-
-
-def _end(run: Run, key: TrialKey) -> str:
-    record = run.records.get(key)
-    return NOT_RUN if record is None else record.end

@@ -97,10 +97,8 @@ def _summary_table(
                 reason = ""
                 if ours != printed_value:
                     reason = _reason(data, table, columns[model], row, name)
-                title = TITLES[table.source]
-                yield Check(
-                    table.source, title, row, model, name, printed_value, ours, reason=reason
-                )
+                cell = (table.source, TITLES[table.source], row, model, name, printed_value)
+                yield Check(*cell, ours, reason=reason)
 
 
 def _reason(data: Published, table: PrintedTable, column: Column, row: str, name: str) -> str:
@@ -176,18 +174,9 @@ def _per_task(data: Published) -> Iterator[Check]:
                     reason = "with one subtask PS is SR" if ours != printed_value else ""
                 else:
                     ours = rounded(rounding.exact_progress(printed_value, count, data.trials))
-                yield Check(
-                    table.source,
-                    TITLES[metric],
-                    about.printed,
-                    model,
-                    f"L{level}",
-                    printed_value,
-                    ours,
-                    derived=metric == "onta" or (metric == "ps" and count == 1),
-                    digits=digits,
-                    reason=reason,
-                )
+                derived = metric == "onta" or (metric == "ps" and count == 1)
+                cell = (TITLES[metric], about.printed, model, f"L{level}", printed_value)
+                yield Check(table.source, *cell, ours, derived, digits, reason=reason)
 
 
 def _intervals(data: Published, columns: Mapping[str, Column]) -> Iterator[Check]:
@@ -201,16 +190,8 @@ def _intervals(data: Published, columns: Mapping[str, Column]) -> Iterator[Check
                 ("low", low, 100 * found.low, ENDS),
                 ("high", high, 100 * found.high, ENDS),
             ):
-                yield Check(
-                    table.source,
-                    "intervals",
-                    row,
-                    model,
-                    name,
-                    printed_value,
-                    rounded(ours, 1 if not allowed else 3),
-                    tolerance=allowed,
-                )
+                cell = (table.source, "intervals", row, model, name, printed_value)
+                yield Check(*cell, rounded(ours, 3 if allowed else 1), tolerance=allowed)
 
 
 def _embodiments(data: Published) -> Iterator[Check]:
@@ -222,17 +203,9 @@ def _embodiments(data: Published) -> Iterator[Check]:
             for name, printed_value in zip(table.columns, row, strict=True):
                 same = robot == data.embodiment
                 ours = data.value(table.model, "sr", task, int(name[1])) if same else printed_value
-                yield Check(
-                    table.source[dimension or "procedural"],
-                    "embodiments",
-                    short,
-                    table.names[robot],
-                    name,
-                    printed_value,
-                    rounded(ours or 0.0, 0),
-                    derived=same,
-                    digits=0,
-                )
+                cell = ("embodiments", short, table.names[robot], name, printed_value)
+                source = table.source[dimension or "procedural"]
+                yield Check(source, *cell, rounded(ours or 0.0, 0), derived=same, digits=0)
 
 
 def _basic(data: Published) -> Iterator[Check]:

@@ -19,36 +19,25 @@ from robospa.tasks.snapshot import Snapshot
 class ClickInOrder:
     """Click the objects of `counters` one after the other; subtask i is counter i, latched.
 
-    With `standing` a touch that began before the object's turn counts when the turn comes. `others`
-    are clicked by mistake only: they emit `wrong_object`.
+    With `standing` a touch that began before the object's turn counts when the turn comes.
     """
 
     needs_contacts = True
 
-    def __init__(
-        self,
-        counters: Sequence[ActionCounter],
-        others: Sequence[ActionCounter] = (),
-        standing: bool = False,
-    ) -> None:
+    def __init__(self, counters: Sequence[ActionCounter], standing: bool = False) -> None:
         self.total = len(counters)
         self._standing = standing
         self._counters = tuple(counters)
-        self._others = tuple(others)
         self._flags = SubtaskFlags(self.total)
         self._early = 0
         self._again = 0
-        self._wrong = 0
 
     @property
     def roles(self) -> dict[str, ObjectRole]:
-        wrong = {c.name: ObjectRole(pressed=True) for c in self._others}
-        return wrong | {
-            c.name: ObjectRole((i,), pressed=True) for i, c in enumerate(self._counters)
-        }
+        return {c.name: ObjectRole((i,), pressed=True) for i, c in enumerate(self._counters)}
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        for counter in (*self._counters, *self._others):
+        for counter in self._counters:
             counter.start(snapshot)
         return ()
 
@@ -69,23 +58,19 @@ class ClickInOrder:
             else:
                 self._again += 1
                 events += (Event(time, "repeated", counter.name, i),)
-        for counter in self._others:
-            if counter.update(snapshot):
-                self._wrong += 1
-                events += (Event(time, "wrong_object", counter.name),)
         if events and self._flags.all and stage < self.total:
             events += (Event(time, "success"),)
         return events
 
     def diagnostics(self) -> dict[str, float]:
-        """Clicks too early, on what was done before, on what is not asked for, and in all."""
+        """Clicks too early, on what was done before, and in all."""
         return {
             "idle_progress": 0.0,
             "out_of_order": self._early,
             "repeated_clicks": self._again,
-            "wrong_clicks": self._wrong,
-            "presses": sum(c.count for c in (*self._counters, *self._others)),
-            "touched": sum(c.figures()["touched"] for c in (*self._counters, *self._others)),
+            "wrong_clicks": 0,
+            "presses": sum(c.count for c in self._counters),
+            "touched": sum(c.figures()["touched"] for c in self._counters),
         }
 
 

@@ -294,8 +294,7 @@ class TaskText:
 
         The slot of an entry is the first part of its name: "blocks.two" fills {blocks}.
         """
-        own = {entry.split(".")[0]: self.phrasings(entry, **values) for entry in entries}
-        return {**COMMON.shared("arm", "table"), **own}
+        return {**COMMON.shared("arm", "table"), **self.shared(*entries, **values)}
 
     def shared(self, *entries: str, **values: object) -> Slots:
         """The phrasings of several entries by slot, without further ones."""

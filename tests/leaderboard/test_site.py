@@ -108,17 +108,6 @@ def test_names_that_are_scripts_stay_text(tmp_path: Path) -> None:
     assert data_of(index_page([evil]))["models"][0]["name"] == EVIL
 
 
-def test_figures_are_drawn_again_only_if_values_change(tmp_path: Path) -> None:
-    entry = published_entries()[0]
-    write_model(entry, tmp_path)
-    figure = tmp_path / "figures" / "success.svg"
-    figure.write_text(figure.read_text().replace("<svg", "<svg data-kept=''", 1))
-    write_model(entry, tmp_path)
-    assert "data-kept" in figure.read_text()
-    write_model(replace(entry, name="Other"), tmp_path)
-    assert "data-kept" not in figure.read_text()
-
-
 def test_a_model_that_left_loses_its_page_and_other_folders_are_left_alone(tmp_path: Path) -> None:
     first, second = published_entries()[:2]
     out = tmp_path / "out"

@@ -333,11 +333,10 @@ def touching(names: str, opening: float = 0.0, instants: int = 3) -> list[Snapsh
 
 
 def test_diagnostics_count_what_went_wrong() -> None:
-    tracker = ClickInOrder([counter("a"), counter("b")], [counter("c")])
-    play(tracker, *touching("bcaa"))
+    tracker = ClickInOrder([counter("a"), counter("b")])
+    play(tracker, *touching("baa"))
     found = tracker.diagnostics()
-    assert (found["out_of_order"], found["wrong_clicks"], found["repeated_clicks"]) == (1, 1, 1)
-    assert (found["presses"], found["idle_progress"]) == (4, 0.0)
+    assert (found["out_of_order"], found["repeated_clicks"], found["presses"]) == (1, 1, 3)
 
 
 # Counts
