@@ -7,7 +7,7 @@ SPREAD := -n auto --maxprocesses 4 --dist loadfile
 UV_COMPILE := $(BIN)/uv pip compile pyproject.toml --universal --fork-strategy fewest \
 	--python-version 3.11 --no-header --generate-hashes -q
 
-.PHONY: help demo learn test test-models test-maniskill install install-dev lint types fast sim docs format lock clean
+.PHONY: help demo learn test test-models install install-dev lint types fast sim docs format lock clean
 
 help: ## What can be made
 	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/:.*## /\t/' | expand -t 14
@@ -44,10 +44,6 @@ test-models: install-dev ## LeRobot: tiny policies served, data sets loaded; in 
 	@[ -n "$$ROBOSPA_MODELS_PYTHON" ] || bash scripts/models.sh
 	$(BIN)/pytest tests/models -m models
 
-test-maniskill: ## ManiSkill: its environments; in .venv-maniskill
-	@bash scripts/models.sh maniskill
-	.venv-maniskill/bin/python -m pytest tests/maniskill -m maniskill
-
 docs: ## The documentation's pages with the API reference, in build/docs; a warning is an error
 	[ -x .venv-docs/bin/pip ] || python3 -m venv .venv-docs
 	.venv-docs/bin/pip install -q --disable-pip-version-check "zensical>=0.0.70" "mkdocstrings-python>=2"
@@ -65,4 +61,4 @@ lock: ## Renew both lock files from pyproject.toml (LOCK=--upgrade for newer ver
 		-o requirements-dev.lock
 
 clean: ## Forget the environment, caches and build output; runs/ stays
-	rm -rf .venv .venv-models .venv-maniskill .venv-peers .venv-docs build .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf .venv .venv-models .venv-peers .venv-docs build .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -25,7 +25,6 @@ EXTRAS = {
     "torch": "learn",
     "gymnasium": "gym",
     "pygame": "gym",
-    "mani_skill": "maniskill",
     "wandb": "wandb",
     "openai": "agent",
     "viser": "view",

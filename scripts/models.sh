@@ -1,9 +1,7 @@
 #!/usr/bin/env bash
-# The environments of the tests with torch, each as its lock file says.
+# The environment of the tests with torch, as its lock file says.
 #
-#   bash scripts/models.sh              .venv-models: LeRobot and tiny models, Python 3.12
-#   bash scripts/models.sh maniskill    .venv-maniskill: ManiSkill, the simulator and our test tools,
-#                                       Python 3.11 or later
+#   bash scripts/models.sh    .venv-models: LeRobot and tiny models
 #
 # The Python is looked for on PATH and among pyenv's versions; MODELS_PYTHON names another. TORCH_INDEX
 # may name an index of CPU builds of torch; without it, or if that cannot be reached, torch comes from the index that pip
@@ -11,19 +9,8 @@
 
 set -euo pipefail
 
-name=${1:-models}
-venv=.venv-$name
-lock=requirements-$name.lock
-locks=("$lock")
-imports="torch, lerobot"
-wanted="== (3, 12)"
-version="Python 3.12"
-if [ "$name" = maniskill ]; then
-    locks+=(requirements-dev.lock)
-    imports="torch, mani_skill"
-    wanted=">= (3, 11)"
-    version="Python 3.11 or later"
-fi
+venv=.venv-models
+lock=requirements-models.lock
 torch_index=${TORCH_INDEX:-}
 
 say() { printf 'models: %s\n' "$*"; }
@@ -35,7 +22,7 @@ fail() {
 
 # A shim of pyenv answers with an error if its version is not switched on: it is run, not only found.
 runs() {
-    "$1" -c "import ensurepip, sys, venv; sys.exit(not sys.version_info[:2] $wanted)" 2>/dev/null
+    "$1" -c "import ensurepip, sys, venv; sys.exit(sys.version_info[:2] != (3, 12))" 2>/dev/null
 }
 
 pyenv_pythons() {
@@ -52,7 +39,7 @@ find_python() {
         fi
     done < <(printf '%s\n' "${MODELS_PYTHON:-}" python3.12 && pyenv_pythons &&
         printf '%s\n' python3 .venv/bin/python)
-    fail "$venv needs $version, and none that runs is on PATH or among pyenv's versions:" \
+    fail "$venv needs Python 3.12, and none that runs is on PATH or among pyenv's versions:" \
         "install one (such as with \`pyenv install 3.12\`) or set MODELS_PYTHON to its path."
 }
 
@@ -61,7 +48,7 @@ pip_install() { "$venv/bin/python" -m pip install -q --disable-pip-version-check
 make_environment() {
     local now python torch
     cd "$(dirname "${BASH_SOURCE[0]}")/.."
-    now="$(cat "${locks[@]}" | sha256sum | cut -d' ' -f1) with robospa"
+    now="$(cat "$lock" | sha256sum | cut -d' ' -f1) with robospa"
     [ "$(cat "$venv/.robospa-models" 2>/dev/null || true)" != "$now" ] || exit 0
     python=$(find_python)
     say "making $venv with $python"
@@ -72,13 +59,13 @@ make_environment() {
         ! pip_install --no-deps --retries 1 --timeout 15 --index-url "$torch_index" "${torch[@]}"; then
         pip_install "${torch[@]}" || fail "pip could not install ${torch[*]}: see its message above."
     fi
-    say "installing the other packages of ${locks[*]}"
+    say "installing the other packages of $lock"
     # Without the hashes that some of the files have: torch may come from another index.
-    pip_install --no-deps -r <(sed -E '/^(torch|torchvision)==/d; /^ +--hash=/d; s/ \\$//' "${locks[@]}") ||
-        fail "pip could not install ${locks[*]}: see its message above."
+    pip_install --no-deps -r <(sed -E '/^(torch|torchvision)==/d; /^ +--hash=/d; s/ \\$//' "$lock") ||
+        fail "pip could not install $lock: see its message above."
     # Its entry points: learners, policies and robots are found by them.
     pip_install --no-deps --no-build-isolation -e . || fail "pip could not install robospa itself."
-    "$venv/bin/python" -c "import $imports" || fail "one of $imports cannot be imported: see above."
+    "$venv/bin/python" -c "import torch, lerobot" || fail "torch or lerobot cannot be imported: see above."
     printf '%s' "$now" >"$venv/.robospa-models"
 }
 
