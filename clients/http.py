@@ -242,6 +242,8 @@ class HttpSession(StatelessSession):
             if error.code == self._silent[0]:
                 error = errors.ServerError(error.code, f"{error.message}; {self._silent[1]}", True)
             raise error if self._answered else explain_error(error, self._params) from error
+        except errors.TransportError as error:
+            raise error if self._answered else explain_error(error, self._params) from error
         self._answered = True
         return answer
 

@@ -3,6 +3,7 @@
     text     {"__ndarray__": true, "data": bytes, "dtype": "<f4", "shape": [..]}      (vla-eval)
     binary   {b"nd": true, b"type": "<f4", b"kind": b"", b"shape": [..], b"data": bytes}
                                                            (XPolicyLab, after msgpack-numpy)
+    npy      {"__ndarray_class__": true, "as_npy": bytes of a .npy file}             (GR00T)
     openpi   {b"__ndarray__": true, b"data": bytes, b"dtype": "<f4", b"shape": [..]}
                                              (read here, written by `robospa.protocol.codec`)
 
@@ -10,6 +11,7 @@ Reading understands all. Plain numbers only: object, structured and complex arra
 extension types too, so nothing that comes over the wire is ever executed.
 """
 
+import io
 from collections.abc import Callable
 from typing import Any
 
@@ -26,6 +28,10 @@ from robospa.protocol.transport import Transport
 
 Form = Callable[[NDArray[Any]], dict[object, object]]
 KINDS = "biuf"
+HEADERS = {
+    (1, 0): np.lib.format.read_array_header_1_0,
+    (2, 0): np.lib.format.read_array_header_2_0,
+}
 
 
 def text_form(array: NDArray[Any]) -> dict[object, object]:
@@ -47,6 +53,25 @@ def binary_form(array: NDArray[Any]) -> dict[object, object]:
         b"shape": list(array.shape),
         b"data": array.tobytes(),
     }
+
+
+def npy_form(array: NDArray[Any]) -> dict[object, object]:
+    """An array as GR00T writes it, whatever the version reads."""
+    file = io.BytesIO()
+    np.lib.format.write_array(file, array, allow_pickle=False)
+    return {"__ndarray_class__": True, "as_npy": file.getvalue()}
+
+
+def read_npy(data: object) -> NDArray[Any]:
+    """The array of plain numbers in a .npy file; raises DecodeError."""
+    try:
+        file = io.BytesIO(data if isinstance(data, bytes) else b"")
+        read = HEADERS[np.lib.format.read_magic(file)]
+        shape, fortran, dtype = read(file)
+    except (KeyError, ValueError, SyntaxError, TypeError) as error:
+        raise DecodeError(f"an array that is no .npy file: {error}") from error
+    found = _build(dtype.str, shape[::-1] if fortran else shape, file.read())
+    return found.T if fortran else found
 
 
 def pack(value: object, form: Form, limits: Limits) -> bytes:
@@ -93,6 +118,8 @@ class _AnyForm(Reader):
             return _build(value.get(b"type"), [], value.get(b"data")).item()
         if value.get("__ndarray__") is True:
             return _build(value.get("dtype"), value.get("shape"), value.get("data"))
+        if value.get("__ndarray_class__") is True:
+            return read_npy(value.get("as_npy"))
         if b"__ndarray__" in value:
             return _build(value.get(b"dtype"), value.get(b"shape"), value.get(b"data"))
         return value.get(b"data") if b"__npgeneric__" in value else value

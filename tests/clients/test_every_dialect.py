@@ -71,7 +71,7 @@ def test_a_declared_length_is_checked_and_its_option_named(name: str) -> None:
     assert "T from 1 to its horizon 4" in str(caught.value)
 
 
-@pytest.mark.parametrize("name", [name for name in DIALECTS if name not in ("go1", "oft")])
+@pytest.mark.parametrize("name", [name for name in DIALECTS if name not in ("go1", "gr00t", "oft")])
 def test_what_the_model_reads_of_an_instruction_is_declared(name: str) -> None:
     with talking(*served(name), text_budget=7) as policy:
         assert policy.spec.text_budget == 7
@@ -86,7 +86,7 @@ def test_poses_in_joint_space_name_the_option(name: str) -> None:
         ask(name, lambda seen: np.zeros((2, 16)))
 
 
-MAPS = ("openpi", "xpolicylab", "vla-eval", "xvla", "robotwin")
+MAPS = ("gr00t", "openpi", "xpolicylab", "vla-eval", "xvla", "robotwin")
 """Servers that answer a map, in which other things may stand."""
 
 
@@ -171,6 +171,7 @@ def test_a_server_that_does_not_answer_in_time(name: str, monkeypatch: pytest.Mo
 
 LOOKS = {
     "go1": "GO-1's server",
+    "gr00t": "a GR00T server",
     "oft": "OpenVLA-OFT's server",
     "xvla": "X-VLA's server",
     "openpi": "an openpi server",
@@ -180,6 +181,7 @@ LOOKS = {
 }
 SPOKEN = {
     "go1": "go1+http",
+    "gr00t": "gr00t",
     "oft": "oft+http",
     "xvla": "xvla+http",
     "openpi": "openpi",
@@ -189,13 +191,15 @@ SPOKEN = {
     "ours": "ws",
 }
 HASTY = Timeouts(connect=1, hello=1, reset=1, first_infer=1, infer=1, end=1, close=0.2)
+SILENT = ("robotwin", "gr00t")
+"""Servers that leave a question over HTTP without answer."""
 WRONG = [
     (server, spoken)
     for server in DIALECTS
-    for spoken in (SPOKEN if server != "robotwin" else ("go1", "vla-eval", "ours"))
+    for spoken in (SPOKEN if server not in SILENT else ("go1", "vla-eval", "ours"))
     if server != spoken and (server, spoken) != ("openpi", "ours")
 ]
-"""RoboTwin's server leaves a question over HTTP without answer: one of each wire takes its time."""
+"""One of each wire, where a question takes its time."""
 
 
 def use(url: str, timeouts: Timeouts = HASTY) -> None:
@@ -210,7 +214,7 @@ def test_the_wrong_dialect_is_told_which_it_looks_like(
     server: str, spoken: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """When connecting or at the first question; a HandshakeError, so the run stops at once."""
-    monkeypatch.setattr(dialect, "SECONDS", 1.0 if server == "robotwin" else 20.0)
+    monkeypatch.setattr(dialect, "SECONDS", 1.0 if server in SILENT else 20.0)
     with DIALECTS[server][0]() as url, pytest.raises(HandshakeError) as caught:
         use(url.replace(SPOKEN[server], SPOKEN[spoken]))
     advice = f"looks like {LOOKS[server]}; try {SPOKEN[server]}://127.0.0.1:"

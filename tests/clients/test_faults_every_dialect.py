@@ -32,6 +32,7 @@ SHORT = Timeouts(10, 30, 30, 30, 30, 0.3, 30, 0.2)
 HUGE = {
     "http": b"HTTP/1.1 200 OK\r\nContent-Length: 2147483648\r\n\r\n",
     "tcp": struct.pack(">I", 2**31),
+    "zmq": struct.pack(">BQ", 2, 2**31),
     "socket": struct.pack(">BBQ", 0x82, 127, 2**31),
 }
 """How 2 GB are announced."""
@@ -193,7 +194,7 @@ def twice(name: str) -> Exception:
         policy.infer(observation(3))
         moment()
         line.mode = "good"
-        if DIALECTS[name][1] == "http":  # what follows an answer is dropped with its buffer
+        if DIALECTS[name][1] in ("http", "zmq"):  # what follows an answer is dropped
             assert policy.infer(observation(6))[0, 0] == 2
             return TransportError("not requested")
         with pytest.raises(TransportError) as caught:
@@ -222,7 +223,7 @@ CASES: dict[str, tuple[type[Exception], Callable[[str], Exception], str]] = {
     "texts": (PolicyError, answering(np.full((2, 14), "0.5")), "the policy answered"),
 }
 """What a server does: the error, how it is caused, and part of what the user reads."""
-NO_TEXTS = ("openpi", "vla-eval", "xpolicylab")
+NO_TEXTS = ("gr00t", "openpi", "vla-eval", "xpolicylab")
 """Arrays of text do not exist in these."""
 
 

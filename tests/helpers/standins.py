@@ -2,6 +2,7 @@
 
 import base64
 import contextlib
+import io
 import json
 import socketserver
 import struct
@@ -486,8 +487,123 @@ class RoboTwin(StandIn):
         return good
 
 
+# ---------------------------------------------------------------- ZeroMQ
+
+
+def npy(value: Any) -> Any:
+    """GR00T's older writing of an array, and its configuration, which travels as it is."""
+    file = io.BytesIO()
+    np.save(file, value, allow_pickle=False)
+    return {"__ndarray_class__": True, "as_npy": file.getvalue()}
+
+
+PARTS = {
+    "left_joints": slice(0, 6),
+    "left_gripper": slice(6, 7),
+    "right_joints": slice(7, 13),
+    "right_gripper": slice(13, None),
+}
+
+
+class Gr00t(StandIn):
+    """GR00T's PolicyServer in front of N1.6: `layout` nested, flat (its simulation wrapper) or n15;
+    `codec` writes an array; `config` is what it says that it reads."""
+
+    scheme = "gr00t"
+    layout = "nested"
+    codec: Callable[[Any], Any] = staticmethod(npy)
+    token: str | None = None
+
+    def __init__(self, *args: Any) -> None:
+        super().__init__(*args)
+        self.calls: list[str] = []
+        self.config: dict[str, dict[str, Any]] = {
+            "video": {"delta_indices": [0], "modality_keys": ["cam_high", "cam_left_wrist"]},
+            "state": {"delta_indices": [0], "modality_keys": list(PARTS)},
+            "action": {"delta_indices": list(range(16)), "modality_keys": list(PARTS)},
+            "language": {"delta_indices": [0], "modality_keys": ["task"]},
+        }
+
+    def listen(self) -> None:
+        import zmq
+
+        context = zmq.Context()
+        socket = context.socket(zmq.REP)
+        self.port = socket.bind_to_random_port("tcp://127.0.0.1")
+        over = threading.Event()
+
+        def work() -> None:
+            while not over.is_set():
+                if socket.poll(20):
+                    data = socket.recv()
+                    try:
+                        reply = self.answer(msgpack.unpackb(data, object_hook=self.read))
+                    except Exception as error:
+                        reply = {"error": str(error)}
+                    default = self.codec
+                    raw = isinstance(reply, bytes)
+                    socket.send(reply if raw else msgpack.packb(reply, default=default))
+
+        thread = threading.Thread(target=work, daemon=True)
+        thread.start()
+        self._stop = [over.set, lambda: thread.join(5), lambda: context.destroy(linger=0)]
+
+    @staticmethod
+    def read(value: Any) -> Any:
+        npy = value.get("as_npy") if "__ndarray_class__" in value else None
+        return value if npy is None else np.load(io.BytesIO(npy), allow_pickle=False)
+
+    def answer(self, seen: Any) -> Any:
+        assert seen.get("api_token") == self.token, "Unauthorized: Invalid API token"
+        self.calls.append(seen["endpoint"])
+        if seen["endpoint"] == "ping":
+            return {"status": "ok", "message": "Server is running"}
+        if seen["endpoint"] == "get_modality_config":
+            text = self.layout == "n15"
+            return {
+                name: {
+                    "__ModalityConfig_class__": True,
+                    "as_json": json.dumps(config) if text else config,
+                }
+                for name, config in self.config.items()
+            }
+        if seen["endpoint"] == "reset" and self.layout != "n15":
+            assert seen["data"] == {"options": None}
+            return {}
+        if seen["endpoint"] != "get_action":
+            raise ValueError(f"Unknown endpoint: {seen['endpoint']}")
+        told = seen["data"] if self.layout == "n15" else seen["data"]["observation"]
+        self.check(told)
+        self.requests.append(told)
+        if self.instead is not None:
+            return self.instead
+        rows = np.asarray(self.model(told))
+        batch = rows if self.layout == "n15" else rows[None]
+        dot = "" if self.layout == "nested" else "action."
+        parts = {f"{dot}{key}": batch[..., columns] for key, columns in PARTS.items()}
+        if self.layout == "n15":
+            return {key: np.squeeze(part) for key, part in parts.items()} | self.extra
+        return [parts | self.extra, {}]
+
+    def check(self, told: Any) -> None:
+        if self.layout == "nested":
+            for modality in ("video", "state", "language"):
+                assert modality in told, f"Observation must contain a '{modality}' key"
+            told = {f"{m}.{key}": value for m in told for key, value in told[m].items()}
+        axes = 0 if self.layout == "n15" else 1
+        for modality, ndim, kind in (("video", 4, np.uint8), ("state", 2, np.float32)):
+            config = self.config[modality]
+            for key in config["modality_keys"]:
+                name = f"{modality}.{key}"
+                assert name in told, f"{modality} key '{name}' must be in observation"
+                value = told[name]
+                assert value.ndim == ndim + axes and value.dtype == kind, name
+                assert value.shape[axes] == len(config["delta_indices"]), name
+
+
 DIALECTS: dict[str, tuple[Callable[..., Any], str, str]] = {
     "go1": (Go1, "http", ""),
+    "gr00t": (Gr00t, "zmq", ""),
     "oft": (Oft, "http", ""),
     "openpi": (OpenPi, "socket", ""),
     "xpolicylab": (XPolicyLab, "socket", ""),
