@@ -10,13 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from robospa.geometry import Vec3
 from robospa.tasks.scene import Scene, SceneObject
 
-Facts = Mapping[str, object]
+Asks = list[dict[str, object]]
+"""Facts of a scene that ask for one of its objects, for each that can be asked for."""
 
 
 def other_target(scene: Scene, rng: np.random.Generator) -> Scene:
@@ -30,34 +31,32 @@ def other_target(scene: Scene, rng: np.random.Generator) -> Scene:
     return replace(scene, facts={**scene.facts, **others[int(rng.integers(len(others)))]})
 
 
-def _by_measure(fact: str, axis: int) -> Callable[[Scene], list[Facts]]:
-    """Blocks by their half size along `axis`, the largest first."""
-
-    def questions(scene: Scene) -> list[Facts]:
-        ranked = sorted(scene.objects, key=lambda o: -float(o.params["half"][axis]))
-        return [{"target": item.name, fact: rank} for rank, item in enumerate(ranked, 1)]
-
-    return questions
+def _ranked(objects: Sequence[SceneObject], key: Callable[[SceneObject], float], fact: str) -> Asks:
+    """Objects by `key`, the largest first."""
+    ranked = sorted(objects, key=key, reverse=True)
+    return [{"target": item.name, fact: rank} for rank, item in enumerate(ranked, 1)]
 
 
-def _by_distance(scene: Scene) -> list[Facts]:
-    """Objects by their distance from the reference, the farthest first."""
+def _by_measure(measure: str, scene: Scene) -> Asks:
+    axis = 2 if measure == "height" else 0
+    return _ranked(scene.objects, lambda o: float(o.params["half"][axis]), f"{measure}_rank")
+
+
+def _by_distance(scene: Scene) -> Asks:
     reference = scene.object(scene.facts["reference"])
     x, y, _ = reference.pose.position
     others = [item for item in scene.objects if item.name != reference.name]
-    others.sort(key=lambda o: -math.dist(o.pose.position[:2], (x, y)))
-    return [{"target": o.name, "distance_rank": rank} for rank, o in enumerate(others, 1)]
+    return _ranked(others, lambda o: math.dist(o.pose.position[:2], (x, y)), "distance_rank")
 
 
-def _by_place(scene: Scene) -> list[Facts]:
-    """Objects by row and column of their grid, counted from the sides that the scene counts from;
-    the sizes of grids are `canonical_index`'s."""
+def _by_place(scene: Scene) -> Asks:
+    """By row and column, counted from the scene's sides; grids are those of `canonical_index`."""
     items = sorted(scene.objects, key=lambda o: o.pose.position[1])
     columns = 4 if len(items) % 4 == 0 else 3
     rows = [items[k : k + columns] for k in range(0, len(items), columns)]
     if scene.facts.get("row_direction") == "far_to_near":
         rows.reverse()
-    found: list[Facts] = []
+    found: Asks = []
     for number, row in enumerate(rows, 1):
         row.sort(key=lambda o: o.pose.position[0])
         if scene.facts["column_direction"] == "right_to_left":
@@ -67,22 +66,17 @@ def _by_place(scene: Scene) -> list[Facts]:
     return found
 
 
-def _by_extreme(scene: Scene) -> list[Facts]:
-    """The leftmost, rightmost, farthest and nearest object in the viewer's words."""
+def _by_extreme(scene: Scene) -> Asks:
     from robospa.tasks.families.cross_view import AXES, EXTREMES, SEEN_AS, SIGNS
 
-    def along(k: int, at: Vec3) -> float:
-        return float(SIGNS[k] * at[AXES[k]])
-
-    words = SEEN_AS[scene.facts["viewpoint"]]
-    found: list[Facts] = []
-    for k, (extreme, position) in enumerate(zip(EXTREMES, words, strict=True)):
-        first = max(scene.objects, key=lambda o: along(k, o.pose.position))
-        found.append({"target": first.name, "extreme": extreme, "position": position})
+    found: Asks = []
+    for k, position in enumerate(SEEN_AS[scene.facts["viewpoint"]]):
+        first = max(scene.objects, key=lambda o: float(SIGNS[k] * o.pose.position[AXES[k]]))
+        found.append({"target": first.name, "extreme": EXTREMES[k], "position": position})
     return found
 
 
-def _by_color(scene: Scene) -> list[Facts]:
+def _by_color(scene: Scene) -> Asks:
     from robospa.tasks.colors import nearest
 
     def word(item: SceneObject) -> str:
@@ -93,34 +87,26 @@ def _by_color(scene: Scene) -> list[Facts]:
     return [{"target": item.name, "color": word(item)} for item in scene.objects]
 
 
-def _by_relation(scene: Scene) -> list[Facts]:
+def _by_relation(scene: Scene) -> Asks:
     """Neighbour and reference exchanged: what was next to it is now named by its place."""
     from robospa.tasks.families.relational import label_in
 
-    facts = scene.facts
+    target, reference, relation = (scene.facts[n] for n in ("target", "reference", "relation"))
     opposite = {"left": "right", "right": "left", "front": "back", "back": "front"}
-    return [
-        {
-            "target": facts["reference"],
-            "reference": facts["target"],
-            "relation": "_".join(opposite[word] for word in facts["relation"].split("_")),
-            "reference_label": label_in(scene, facts["target"]),
-        }
-    ]
+    turned = "_".join(opposite[word] for word in relation.split("_"))
+    named = {"reference": target, "reference_label": label_in(scene, target)}
+    return [{"target": reference, "relation": turned, **named}]
 
 
-QUESTIONS: Mapping[str, Callable[[Scene], list[Facts]]] = {
-    "size_rank": _by_measure("size_rank", 0),
-    "height_rank": _by_measure("height_rank", 2),
-    "length_rank": _by_measure("length_rank", 0),
-    "area_rank": _by_measure("area_rank", 0),
+QUESTIONS: Mapping[str, Callable[[Scene], Asks]] = {
+    **{f"{m}_rank": partial(_by_measure, m) for m in ("size", "height", "length", "area")},
     "distance_rank": _by_distance,
     "column": _by_place,
     "relation": _by_relation,
     "extreme": _by_extreme,
     "color": _by_color,
 }
-"""By a fact of the scene: the facts that ask for each of its objects."""
+"""By a fact that says how the scene asks."""
 
 
 def about_nothing_here(scene: Scene, rng: np.random.Generator) -> str:
@@ -135,8 +121,7 @@ def about_nothing_here(scene: Scene, rng: np.random.Generator) -> str:
 
 
 def misspelt(sentence: str, rng: np.random.Generator, errors: int) -> str:
-    """`sentence` with so many words of four letters or more in which two neighbours are exchanged,
-    neither of them the first."""
+    """`sentence` with so many words of five letters or more in which two letters are exchanged."""
     words = sentence.split(" ")
     long = [n for n, word in enumerate(words) if len(word) > 4 and word.isalpha()]
     for n in rng.permutation(long)[:errors].tolist():
