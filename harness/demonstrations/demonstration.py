@@ -339,4 +339,5 @@ def replay(
     if kind.startswith(MISTAKE_PREFIX):
         allowed = len(executed)
     policy = RecordedPolicy(executed, "joint")
-    return trial.run_trial(world, policy, key, policy_seed=0, step_scale=allowed / limit)
+    scale = allowed / limit
+    return trial.run_trial(world, policy, key, policy_seed=0, step_scale=scale, replayed=True)

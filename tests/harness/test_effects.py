@@ -1,5 +1,7 @@
 """What a mode does to pictures, actions and the start pose."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from robospa.harness.effects import PICTURES, Effects
 from robospa.harness.selection import list_trials, seed_sources
 from robospa.harness.settings import Selection, SettingsError
 from robospa.tasks.catalog import build_scene
+from robospa.trial import TrialKey
 
 RNG = np.random.default_rng(0)
 PICTURE = RNG.integers(0, 256, (48, 64, 3), dtype=np.uint8)
@@ -85,3 +88,20 @@ def test_a_profile_has_the_clean_seeds_in_every_arm() -> None:
     assert source["origin"] == "shipped"
     with pytest.raises(SettingsError, match="leave mode out"):
         Selection(profile="blur", mode="randomized")
+
+
+@pytest.mark.sim
+def test_a_replay_executes_what_was_executed_and_nothing_twice() -> None:
+    from robospa.baselines.oracle import Oracle
+    from robospa.harness.replay import replay
+    from robospa.harness.running.record_store import ActionRecorder
+    from robospa.harness.sim.sapien_world import SapienWorld
+    from robospa.harness.trial import run_trial
+
+    world, recorder = SapienWorld(render=False), ActionRecorder()
+    key = TrialKey("Pick_Blocks_Size", 1, 100_000, mode="randomized:start=5,action-noise=5")
+    first = run_trial(world, Oracle(), key, policy_seed=0, recorder=recorder)
+    again = replay(world, key, recorder.actions, "joint")
+    clean = run_trial(world, Oracle(), replace(key, mode="clean"), policy_seed=0)
+    assert first.digest == again.digest != clean.digest
+    assert first.actions_digest == again.actions_digest
