@@ -38,21 +38,17 @@ NAME = re.compile(r"pi05_(?P<lora>lora_)?robospa_(?P<dataset>[A-Za-z0-9][A-Za-z0
 SOURCES = "openpi's sources"
 CAMERAS = {theirs: ours for ours, theirs in CAMERA_NAMES.items() if ours != "front"}
 """Our camera for each image of openpi's Aloha transform."""
+REPACKED = {
+    "images": {theirs: f"observation.images.{ours}" for theirs, ours in CAMERAS.items()},
+    "state": "observation.state",
+    "actions": "action",
+    "prompt": "prompt",
+}
+"""What openpi is to take from a frame of our dataset, under its own names."""
 WEIGHTS = "gs://openpi-assets/checkpoints/pi05_base/params"
 STEPS = 20_000
 BATCH = 16
 """Of the paper: its appendix on training; all parameters, from the released weights."""
-
-
-def repack() -> dict[str, Any]:
-    """What openpi is to take from a frame of our dataset, under its own names."""
-    images = {theirs: f"observation.images.{ours}" for theirs, ours in CAMERAS.items()}
-    return {
-        "images": images,
-        "state": "observation.state",
-        "actions": "action",
-        "prompt": "prompt",
-    }
 
 
 def train_config(name: str, code: str | None = None) -> Any:
@@ -85,7 +81,7 @@ def train_config(name: str, code: str | None = None) -> Any:
             repo_id=f"robospa/{match['dataset']}",
             adapt_to_pi=False,
             use_delta_joint_actions=True,
-            repack_transforms=transforms.Group(inputs=[transforms.RepackTransform(repack())]),
+            repack_transforms=transforms.Group(inputs=[transforms.RepackTransform(REPACKED)]),
             base_config=configs.DataConfig(prompt_from_task=True),
         ),
         weight_loader=loaders.CheckpointWeightLoader(WEIGHTS),

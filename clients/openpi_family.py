@@ -11,8 +11,8 @@ and a server that does not know it is taken for openpi's.
 """
 
 import contextlib
-import json
 import math
+import re
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, make_dataclass, replace
@@ -89,8 +89,9 @@ class FamilyOptions(ChunkOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.camera_names, self.committed_names  # noqa: B018
-        self.maps["extra"], self.maps["reset"]
+        self.camera_names, self.maps  # noqa: B018
+        if self.committed and not re.fullmatch("[^,]+,[^,]+", self.committed):
+            raise ValueError(f"option committed={self.committed[:80]!r} is not two names")
         if self.order and sorted(self.order) != list(range(self.action_dim)):
             raise ValueError(
                 f"option order={self.order} is not an order of {self.action_dim} columns"
@@ -123,19 +124,15 @@ class FamilyOptions(ChunkOptions):
         return names
 
     @cached_property
-    def committed_names(self) -> tuple[str, str] | None:
-        """The server's names of our `committed` and `delay`; None if it reads neither."""
-        if not self.committed:
-            return None
-        rows, comma, delay = self.committed.partition(",")
-        if not (comma and rows and delay) or "," in delay:
-            raise ValueError(f"option committed={self.committed[:80]!r} is not two names")
-        return rows, delay
-
-    @cached_property
     def maps(self) -> dict[str, dict[str, object]]:
         """The options `extra` and `reset` as maps."""
-        return {name: _json_map(name, getattr(self, name)) for name in ("extra", "reset")}
+        found: dict[str, dict[str, object]] = {}
+        for name, text in (("extra", self.extra), ("reset", self.reset)):
+            try:
+                found[name] = dict(parse_json(text).items())
+            except (ValueError, AttributeError):
+                raise ValueError(f"option {name}={text[:80]!r} is not a JSON map") from None
+        return found
 
     def request(self, observation: Observation) -> dict[str, object]:
         """The message for one observation; raises EncodeError for a camera without a name there."""
@@ -158,8 +155,8 @@ class FamilyOptions(ChunkOptions):
                 joints = joints[np.argsort(self.order)]
             name = self.joints.removesuffix("[]")
             sent[name] = joints if name == self.joints else joints[None]
-        if self.committed_names is not None and "committed" in observation:
-            rows, delay = self.committed_names
+        if self.committed and "committed" in observation:
+            rows, delay = self.committed.split(",")
             sent[rows] = np.asarray(observation["committed"], np.float64)
             sent[delay] = observation["delay"]
         for name in reversed([n for n in self.inside.split("/") if n and n != "0"]):
@@ -182,16 +179,6 @@ class FamilyOptions(ChunkOptions):
         ours, width = list(self.order), chunk.shape[1]
         more = width > len(ours) and ours == sorted(ours)
         return chunk[:, ours] if more or width == len(ours) else chunk
-
-
-def _json_map(name: str, text: str) -> dict[str, object]:
-    try:
-        found = json.loads(text)
-    except (ValueError, RecursionError):
-        found = None
-    if not isinstance(found, dict):
-        raise ValueError(f"option {name}={text[:80]!r} is not a JSON map")
-    return found
 
 
 def _averaged(image: NDArray[np.uint8 | np.float32], new: int) -> NDArray[np.float32]:
