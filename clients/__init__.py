@@ -124,7 +124,7 @@ def connect(
     # nobody waits for minutes.
     hello, handshake = min(PATIENCE, params.timeouts.hello), min(PATIENCE, params.timeouts.connect)
     brief = replace(params, timeouts=replace(params.timeouts, hello=hello, connect=handshake))
-    if endpoint.dialect.wire != "websocket":
+    if endpoint.dialect.wire not in ("websocket", "http"):
         brief = params
 
     def opened() -> WireClient:

@@ -281,6 +281,7 @@ def _run_checks(console: Console, target: Target, trials: int) -> list[CheckResu
     from rich.table import Table
     from rich.text import Text
 
+    from robospa.clients.dialect import dialects
     from robospa.harness.server_checks import rollouts
     from robospa.protocol.conformance import check as check_protocol
 
@@ -291,9 +292,11 @@ def _run_checks(console: Console, target: Target, trials: int) -> list[CheckResu
         connector=target.connect,
         shared_state=target.dialect.shared_state,
     )
-    if results[0].passed and target.dialect.sign:
-        detail = f"{results[0].detail}, because {target.dialect.sign}"
-        results[0] = replace(results[0], detail=detail)
+    said = results[0].detail
+    spoken = [d for d in dialects() if said.startswith(f"speaks the dialect {d.scheme}")]
+    if results[0].passed:
+        sign = (*spoken, target.dialect)[0].sign
+        results[0] = replace(results[0], detail=f"{said}, because {sign}")
     failed = {result.name for result in results if result.passed is False}
     if not failed & {"handshake", "actions"}:
         results.append(_first_actions(target.connect))
