@@ -141,36 +141,23 @@ def a_folder(folder: Path) -> None:
     (folder / "bundle.zip" / "setup.py").write_text("raise SystemExit")
 
 
-def at_an_address(folder: Path) -> None:
-    path = folder / "bundle.txt"
-    path.write_text(path.read_text().replace("bundle.zip", "https://example.org/b.zip"))
+def announced(old: str, new: str) -> Callable[[Path], object]:
+    """bundle.txt says `new` for `old`."""
+
+    def spoil(folder: Path) -> None:
+        path = folder / "bundle.txt"
+        path.write_text(path.read_text().replace(old, new))
+
+    return spoil
 
 
-def a_path(folder: Path) -> None:
-    path = folder / "bundle.txt"
-    path.write_text(path.read_text().replace("bundle.zip", "../theirs/bundle.zip"))
-
-
-def at_weights_elsewhere(folder: Path) -> None:
-    (folder / "model.toml").write_text(CARD_TEXT)
-
-
-def by_another_recipe(folder: Path) -> None:
-    (folder / "model.toml").write_text(CARD.replace("learn_fake", "learn_other"))
-
-
-def out_of_scripts(folder: Path) -> None:
-    (folder / "model.toml").write_text(CARD.replace("scripts/learn_fake", "scripts/../evil"))
+def card(text: str) -> Callable[[Path], object]:
+    return lambda folder: (folder / "model.toml").write_text(text)
 
 
 def more_bytes(folder: Path) -> None:
     with (folder / "bundle.zip").open("ab") as file:
         file.write(b"x")
-
-
-def announced_as_huge(folder: Path) -> None:
-    path = folder / "bundle.txt"
-    path.write_text(f"bundle.zip\n{in_repository.MOST + 1}\n{path.read_text().split()[2]}\n")
 
 
 @pytest.mark.parametrize(
@@ -181,13 +168,19 @@ def announced_as_huge(folder: Path) -> None:
         (a_folder, "missing or no plain file"),
         (lambda folder: (folder / "bundle.zip").unlink(), "does not hold the files"),
         (lambda folder: (folder / "setup.py").write_text("x"), "does not hold the files"),
-        (at_an_address, "does not hold the files bundle.txt, model.toml, and only them"),
-        (a_path, "is not three lines"),
-        (at_weights_elsewhere, "only if a recipe there remakes the weights"),
-        (by_another_recipe, "scripts/learn_other.sh, which this repository does not have"),
-        (out_of_scripts, "a https address of at most 300 characters, or recipe"),
+        (announced("bundle.zip", "https://example.org/b.zip"), "bundle.txt, model.toml, and only"),
+        (announced("bundle.zip", "../theirs/bundle.zip"), "is not three lines"),
+        (announced("zip\n", "zip\n9999"), "announces more than 8388608 bytes"),
+        (card(CARD_TEXT), "only if a recipe there remakes the weights"),
+        (
+            card(CARD.replace("learn_fake", "learn_other")),
+            "scripts/learn_other.sh, which this repository does not have",
+        ),
+        (
+            card(CARD.replace("scripts/", "scripts/../")),
+            "a https address of at most 300 characters",
+        ),
         (more_bytes, r"has \d+ bytes, not \d+"),
-        (announced_as_huge, "announces more than 8388608 bytes"),
     ],
 )
 def test_what_is_handed_in_wrongly_is_refused_before_it_is_opened(

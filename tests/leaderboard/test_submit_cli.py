@@ -40,11 +40,25 @@ def packed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def packed_for_practice(packed: Path, bundle: Path) -> Path:
+    told = ["--model", packed / "model.toml", "-o", bundle, "--practice", "--no-videos"]
+    done = submit("pack", packed / "run", *told, *FAKES)
+    assert done.code == 0, done.err
+    return bundle
+
+
+def hidden_block(folder: Path, count: int) -> tuple[Block, list[str | Path]]:
+    """`count` hidden seeds of both levels, with the words that name their file."""
+    hidden = tuple(FIRST + n for n in range(count))
+    block = Block({f"{PICK}/{level}": hidden for level in (1, 2)}, "ab" * 32)
+    write_block(block, folder / "block.json")
+    return block, ["--block", folder / "block.json", "--commitment", block.commitment]
+
+
 def test_from_run_to_badge(packed: Path) -> None:
     bundle = packed / "bundle.zip"
-    done = submit(
-        "pack", packed / "run", "--model", packed / "model.toml", "-o", bundle, "--practice", *FAKES
-    )
+    words = ["--model", packed / "model.toml", "-o", bundle, "--practice", *FAKES]
+    done = submit("pack", packed / "run", *words)
     assert done.code == 0, done.err
     assert "8 trials" in done.out and "bundle " in done.out
 
@@ -78,9 +92,7 @@ def test_from_run_to_badge(packed: Path) -> None:
 def test_a_sample_has_its_least_size_whatever_fraction_is_asked_for(
     packed: Path, tmp_path: Path
 ) -> None:
-    bundle = tmp_path / "b.zip"
-    more = ["--practice", "--no-videos", *FAKES]
-    submit("pack", packed / "run", "--model", packed / "model.toml", "-o", bundle, *more)
+    bundle = packed_for_practice(packed, tmp_path / "b.zip")
     more = ["--practice", "--challenge", "0123456789abcdef", "--fraction", "0.01", *FAKES]
     done = submit("verify", bundle, *more, "--evidence", tmp_path / "e.json")
     assert "8 of 8 trials were played again" in done.out
@@ -105,14 +117,8 @@ def test_a_bad_challenge_is_refused_before_any_work(
 
 
 def test_hidden_seeds_run_against_a_server(packed: Path) -> None:
-    bundle = packed / "again.zip"
-    more = ["--practice", "--no-videos", *FAKES]
-    done = submit("pack", packed / "run", "--model", packed / "model.toml", "-o", bundle, *more)
-    assert done.code == 0, done.err
-    hidden = tuple(FIRST + n for n in range(5))
-    block = Block({f"{PICK}/{level}": hidden for level in (1, 2)}, "ab" * 32)
-    write_block(block, packed / "block.json")
-    told = ["--block", packed / "block.json", "--commitment", block.commitment]
+    bundle = packed_for_practice(packed, packed / "again.zip")
+    block, told = hidden_block(packed, 5)
     with ServerThread(policy_factory=Weak) as server:
         words = [bundle, server.url, *told, "--out", packed / "fresh", "--practice", *FAKES]
         done = submit("reproduce", *words, "--evidence", packed / "hidden.json")
@@ -168,13 +174,8 @@ class Worse(Weak):
 
 def test_inflated_numbers_are_not_reproduced(packed: Path, tmp_path: Path) -> None:
     """6 of 8 claimed, 0 of 16 afresh: p = 2 (4/220)^2, C(4, 3) of C(12, 3) for each level."""
-    bundle = tmp_path / "b.zip"
-    more = ["--practice", "--no-videos", *FAKES]
-    submit("pack", packed / "run", "--model", packed / "model.toml", "-o", bundle, *more)
-    hidden = tuple(FIRST + n for n in range(8))
-    block = Block({f"{PICK}/1": hidden, f"{PICK}/2": hidden}, "ab" * 32)
-    write_block(block, tmp_path / "block.json")
-    told = ["--block", tmp_path / "block.json", "--commitment", block.commitment]
+    bundle = packed_for_practice(packed, tmp_path / "b.zip")
+    _, told = hidden_block(tmp_path, 8)
     with ServerThread(policy_factory=Worse) as server:
         words = [bundle, server.url, *told, "--out", tmp_path / "fresh", "--practice", *FAKES]
         done = submit("reproduce", *words, "--evidence", tmp_path / "hidden.json")
@@ -186,12 +187,8 @@ def test_inflated_numbers_are_not_reproduced(packed: Path, tmp_path: Path) -> No
 def test_another_server_than_the_bundles_is_refused(packed: Path, tmp_path: Path) -> None:
     from run_fakes import FakePolicy, other
 
-    bundle = tmp_path / "b.zip"
-    more = ["--practice", "--no-videos", *FAKES]
-    submit("pack", packed / "run", "--model", packed / "model.toml", "-o", bundle, *more)
-    block = Block({f"{PICK}/1": (FIRST,), f"{PICK}/2": (FIRST,)}, "ab" * 32)
-    write_block(block, tmp_path / "block.json")
-    told = ["--block", tmp_path / "block.json", "--commitment", block.commitment]
+    bundle = packed_for_practice(packed, tmp_path / "b.zip")
+    _, told = hidden_block(tmp_path, 1)
     assert FakePolicy().spec != other().spec
     with ServerThread(policy_factory=other) as server:
         words = [bundle, server.url, *told, "--out", tmp_path / "fresh", "--practice", *FAKES]
