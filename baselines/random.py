@@ -3,14 +3,16 @@
 Repeatable: the walk of a trial follows from its policy seed and the step alone.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace
+from robospa.baselines.hold import CHUNK, Hold
 from robospa.observation import Observation
-from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.protocol.policy import TrialInfo
 
-CHUNK = 10
 STRIDE = 0.15
 """Standard deviation of one action's joint change [rad]."""
 
@@ -18,14 +20,7 @@ STRIDE = 0.15
 class Random:
     """Walks from where the arms are; grippers open and close at random. Needs no image."""
 
-    spec = PolicySpec(
-        name="random",
-        cameras=(),
-        state="commanded",
-        horizon=CHUNK,
-        seeded=True,
-        checkpoint="no weights",
-    )
+    spec = replace(Hold.spec, name="random")
 
     def __init__(self) -> None:
         self._seed, self._grippers = 0, ActionSpace("joint").grippers

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.harness.running.manifest import this_processor
-from robospa.harness.running.record_store import ActionRecorder, read_actions, read_joints
+from robospa.harness.running.record_store import ActionRecorder, read_trace
 from robospa.harness.trial import (
     Recorder,
     TrialSetup,
@@ -162,8 +162,7 @@ def replay_record(
         raise ReplayError(
             f"{key.slug} was run in another scene than this version of robospa makes of its key"
         )
-    path = action_path(folder, key)
-    actions, space = read_actions(path)
+    actions, space, joints = read_trace(action_path(folder, key))
     # A trial with a time limit of its own may have more actions than its step limit has.
     limit = setup.task.levels[key.level].steps
     again = replay(
@@ -171,7 +170,7 @@ def replay_record(
         key,
         actions,
         space,
-        joints=read_joints(path),
+        joints=joints,
         of=record,
         policy_seed=record.policy_seed,
         recorder=recorder,

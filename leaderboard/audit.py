@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from robospa.harness.factory import load_function, open_policy
 from robospa.harness.replay import expert_actions, rehearse
-from robospa.harness.running.record_store import read_actions, read_joints
+from robospa.harness.running.record_store import read_trace
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import TrialSetup, new_run_seed, task_parts
 from robospa.leaderboard.agreement import Counts, agreement
@@ -95,10 +95,9 @@ def executed_paths(path: Path, count: int) -> tuple[Run, dict[TrialKey, Trace]]:
         traces = read_traces(bundle, chosen)
         spaces = {key: spec_of(bundle.settings, key.task).space for key in chosen}
     else:
-        files = {key: action_path(path, key) for key in chosen}
-        read = {key: read_actions(file) for key, file in files.items()}
-        spaces = {key: space for key, (_, space) in read.items()}
-        traces = {key: with_joints(read[key][0], read_joints(file)) for key, file in files.items()}
+        read = {key: read_trace(action_path(path, key)) for key in chosen}
+        spaces = {key: trace.space for key, trace in read.items()}
+        traces = {key: with_joints(trace.actions, trace.joints) for key, trace in read.items()}
     return run, {k: split_trace(traces[k], k.embodiment, spaces[k])[1] for k in chosen}
 
 

@@ -19,7 +19,7 @@ from msgspec import structs, to_builtins
 from robospa.action_space import STEPS_PER_UNIT, is_quantized
 from robospa.harness.factory import load_function
 from robospa.harness.running.manifest import changed_settings
-from robospa.harness.running.record_store import read_actions, read_joints
+from robospa.harness.running.record_store import read_trace
 from robospa.harness.world import World
 from robospa.harness.worlds import open_world
 from robospa.leaderboard import bundle as layout
@@ -116,8 +116,8 @@ def _pack(
     part = out.with_name(f".{out.name}.{os.getpid()}.part")
 
     def trace(key: TrialKey) -> Trace:
-        path = action_path(homes[key], key)
-        actions = with_joints(read_actions(path)[0], read_joints(path))
+        kept = read_trace(action_path(homes[key], key))
+        actions = with_joints(kept.actions, kept.joints)
         if not is_quantized(actions):
             raise BundleError(
                 f"{key.slug} has actions finer than 1/{STEPS_PER_UNIT}, as runs of older "

@@ -137,6 +137,7 @@ def _hosted(
 ) -> dict[str, Any]:
     """What the server runs: a shared policy or a factory of one per connection, and its options."""
     from functools import partial
+    from importlib import metadata
 
     from robospa.protocol.connection_limits import ServerOptions
     from robospa.protocol.options import read_options
@@ -158,7 +159,7 @@ def _hosted(
         hint = f"see robospa serve {policy} --show-options"
         raise BadOptions(f"{policy} cannot be served: {error} ({hint})") from error
     made = make(chosen)
-    name = " ".join(["robospa", _version(), policy, *_changed(chosen, made)])
+    name = " ".join(["robospa", metadata.version("robospa"), policy, *_changed(chosen, made)])
     return {
         "policy_factory" if callable(made) else "policy": made,
         # The name reaches every client, and so a run's manifest.
@@ -176,15 +177,6 @@ def _changed(options: Any, made: Any) -> list[str]:
     decide = [field for field in dataclasses.fields(options) if field.name not in out]
     pairs = [(field, getattr(options, field.name)) for field in decide]
     return [f"{field.name}={value}" for field, value in pairs if value != field.default]
-
-
-def _version() -> str:
-    from importlib import metadata
-
-    try:
-        return metadata.version("robospa")
-    except metadata.PackageNotFoundError:
-        return "(not installed)"
 
 
 def _show_options(policy: str, make: Callable[..., object]) -> None:

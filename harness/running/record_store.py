@@ -18,7 +18,7 @@ import zipfile
 import zlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -202,32 +202,34 @@ def write_actions(
     replace_file(action_path(folder, key), buffer.getvalue(), parents=False)
 
 
-def read_actions(path: Path) -> tuple[NDArray[np.float32], str]:
-    """(actions (steps, D), action space) of a trace; raises RunError if it is none."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            actions = _member(archive, "actions.npy")
-            space = _member(archive, "space.npy")
-    except _BROKEN as error:
-        raise RunError(f"{path} is no action trace: {error}") from error
-    if actions.ndim != 2 or actions.dtype.kind != "f" or space.ndim or space.dtype.kind != "U":
-        raise RunError(f"{path} is no action trace: it has other arrays")
-    return np.asarray(actions, dtype=np.float32), str(space)
+class ActionTrace(NamedTuple):
+    """What a trial executed; `joints` (steps, D') in place of pose actions, None if there are none,
+    as of joint policies and in traces of older versions."""
+
+    actions: NDArray[np.float32]
+    """(steps, D)"""
+    space: str
+    joints: NDArray[np.float32] | None
 
 
-def read_joints(path: Path) -> NDArray[np.float32] | None:
-    """The joint actions (steps, D) executed in place of pose actions; None if a trace has none, as
-    those of joint policies and of older versions. Raises RunError if it is no trace."""
+def read_trace(path: Path) -> ActionTrace:
+    """What `write_actions` kept; raises RunError if it is no trace."""
     try:
         with zipfile.ZipFile(path) as archive:
-            if "joints.npy" not in archive.namelist():
-                return None
-            joints = _member(archive, "joints.npy")
+            space, actions = _member(archive, "space.npy"), _member(archive, "actions.npy")
+            extra = "joints.npy" in archive.namelist()
+            joints = _member(archive, "joints.npy") if extra else None
     except _BROKEN as error:
         raise RunError(f"{path} is no action trace: {error}") from error
-    if joints.ndim != 2 or joints.dtype.kind != "f":
+    numbers = [actions] if joints is None else [actions, joints]
+    plain = all(array.ndim == 2 and array.dtype.kind == "f" for array in numbers)
+    if not plain or space.ndim or space.dtype.kind != "U":
         raise RunError(f"{path} is no action trace: it has other arrays")
-    return np.asarray(joints, dtype=np.float32)
+    return ActionTrace(
+        np.asarray(actions, np.float32),
+        str(space),
+        None if joints is None else np.asarray(joints, np.float32),
+    )
 
 
 _BROKEN = (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error)

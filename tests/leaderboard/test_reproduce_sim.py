@@ -16,7 +16,7 @@ from shadow import HORIZON, TOLD_SEED, Shadow, Shy, Thief, ids
 from robospa.baselines.oracle import Oracle
 from robospa.baselines.random import Random
 from robospa.harness.running.evaluate import Request, evaluate
-from robospa.harness.running.record_store import read_actions
+from robospa.harness.running.record_store import read_trace
 from robospa.harness.running.request import make_request
 from robospa.harness.settings import EvaluationSettings, updated
 from robospa.harness.sim.sapien_world import SapienWorld
@@ -111,14 +111,14 @@ def test_the_audit_knows_the_expert_again(
     """An honest baseline, which moves and fails, is not taken for one."""
     world, expert = SapienWorld(render=False), Oracle()
     rehearsed = {key: expert_actions(world, expert, key) for key in claimed[:1]}
-    traces = {key: read_actions(action_path(stolen.folder, key))[0] for key in claimed[:1]}
+    traces = {key: read_trace(action_path(stolen.folder, key)).actions for key in claimed[:1]}
     assert expert_likeness(traces, lambda key: rehearsed[key]).suspicious
     noise = np.random.default_rng(0)
     shaken = {k: t + noise.normal(0, 0.002, t.shape).astype(np.float32) for k, t in traces.items()}
     assert expert_likeness(shaken, lambda key: rehearsed[key]).suspicious
     shy = run(tmp_path / "shy", claimed[:1], Shy)
     assert all(record.success for record in shy.records.values())
-    detour = {key: read_actions(action_path(shy.folder, key))[0] for key in claimed[:1]}
+    detour = {key: read_trace(action_path(shy.folder, key)).actions for key in claimed[:1]}
     assert not expert_likeness(detour, lambda key: rehearsed[key]).suspicious, "hidden scenes do"
     walk = {key: expert_actions(world, Random(), key) for key in claimed[:1]}
     assert not expert_likeness(walk, lambda key: rehearsed[key]).suspicious

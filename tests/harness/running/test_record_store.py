@@ -22,14 +22,14 @@ import pytest
 from fake_runs import KEY, RECORD, other
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from robospa.harness.running.atomic_file import StorageError, replace_file, run_lock
 from robospa.harness.running.manifest import changed_settings
 from robospa.harness.running.policy_probe import read_map
 from robospa.harness.running.record_store import (
     RecordWriter,
-    read_actions,
-    read_joints,
+    read_trace,
     recover_folder,
     write_actions,
 )
@@ -146,29 +146,21 @@ def test_a_policy_error_that_was_withdrawn_is_no_result(
     assert read_records(tmp_path)[KEY] == WITHDRAWN[max(order)]
 
 
-def test_actions_survive_their_file(tmp_path: Path) -> None:
-    actions = np.linspace(0, 1, 28, dtype=np.float32).reshape(2, 14)
-    write_actions(tmp_path, KEY, actions, "joint")
-    back, space = read_actions(action_path(tmp_path, KEY))
-    assert space == "joint"
-    np.testing.assert_array_equal(back, actions)
+@pytest.mark.parametrize("joints", [None, np.ones((2, 14), np.float32)])
+def test_actions_survive_their_file(tmp_path: Path, joints: NDArray[np.float32] | None) -> None:
+    actions = np.linspace(0, 1, 32, dtype=np.float32).reshape(2, 16)
+    write_actions(tmp_path, KEY, actions, "ee", joints)
+    back = read_trace(action_path(tmp_path, KEY))
+    assert back.space == "ee"
+    np.testing.assert_array_equal(back.actions, actions)
+    np.testing.assert_equal(back.joints, joints)
 
 
-def test_the_joints_of_pose_actions_survive_their_file(tmp_path: Path) -> None:
-    poses, joints = np.ones((2, 16), np.float32), np.ones((2, 14), np.float32)
-    write_actions(tmp_path, KEY, poses, "ee", joints)
-    np.testing.assert_array_equal(read_actions(action_path(tmp_path, KEY))[0], poses)
-    np.testing.assert_array_equal(read_joints(action_path(tmp_path, KEY)), joints)
-    write_actions(tmp_path, KEY, poses, "ee")  # as older versions did
-    assert read_joints(action_path(tmp_path, KEY)) is None
-
-
-@pytest.mark.parametrize("read", [read_actions, read_joints])
-def test_a_broken_action_trace_is_named(tmp_path: Path, read: Callable[[Path], object]) -> None:
+def test_a_broken_action_trace_is_named(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     path.write_bytes(b"PK nonsense")
     with pytest.raises(RunError, match="no action trace"):
-        read(path)
+        read_trace(path)
 
 
 # ---------------------------------------------------------------- one driver per run
@@ -219,7 +211,7 @@ class Strict(RecordWriter):
     """Refuses a record whose actions are not on disk."""
 
     def write(self, record: TrialRecord) -> None:
-        actions, _ = read_actions(action_path(self.path.parents[1], record.key))
+        actions = read_trace(action_path(self.path.parents[1], record.key)).actions
         assert len(actions) == record.steps
         super().write(record)
 
@@ -386,7 +378,7 @@ class Readers:
                 lambda path: client_options("openpi://h:1", path)),
             "seeds": ([b'{"Pick_A": {"1": [1, 2], "2": [3]}}', b"[100000, 100001]"],
                 lambda path: parse_seeds(str(path))("Pick_A", 1)),
-            "actions": ([next((folder / "actions").glob("*.npz")).read_bytes()], read_actions),
+            "actions": ([next((folder / "actions").glob("*.npz")).read_bytes()], read_trace),
             "traces": ([encode(traces), encode(traces * 3), encode([])],
                 lambda path: decode(path.read_bytes(), "actions")),
             "archive": ([self.bundle.read_bytes()], self.archive),

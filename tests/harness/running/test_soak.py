@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from robospa.harness.running.atomic_file import PARTIAL
-from robospa.harness.running.record_store import read_actions
+from robospa.harness.running.record_store import read_trace
 from robospa.harness.trial import actions_digest
 from robospa.results.records.runs import ACTIONS, TRIALS, action_path, finished, read_file, read_run
 from robospa.results.records.trial_record import TrialRecord
@@ -167,7 +167,7 @@ def problems(folder: Path, reference: Mapping[TrialKey, TrialRecord]) -> list[st
     for key in set(count) & set(reference):
         record, wanted = found.records[key], decided(reference[key])
         wrong += [f"{key.slug}: {n} differs" for n, v in decided(record).items() if v != wanted[n]]
-        actions, _ = read_actions(action_path(folder, key))
+        actions = read_trace(action_path(folder, key)).actions
         refused = record.end == "policy_error" and len(actions) == record.steps - 1  # not kept
         if not refused and actions_digest(list(actions)) != record.actions_digest:
             wrong.append(f"{key.slug}: the actions on disk are not those of the record")
