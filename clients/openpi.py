@@ -30,6 +30,7 @@ import numpy as np
 from robospa.action_space import ActionSpace
 from robospa.clients.chunks import STATE_TOKENS, Count, RobotOption
 from robospa.clients.model_policy import Chunk, ModelPolicy, Query, describe_checkpoint, import_code
+from robospa.clients.openpi_family import FamilyOptions
 from robospa.protocol.openpi import CAMERA_NAMES
 from robospa.protocol.options import option
 from robospa.protocol.policy import PolicySpec
@@ -150,7 +151,7 @@ class OpenPi(ModelPolicy):
         )
 
     def predict(self, queries: Sequence[Query]) -> list[Chunk]:
-        inputs = [_observation(query) for query in queries]
+        inputs = [FamilyOptions().request(query.observation) for query in queries]
         noise = [self._noise(query.seed) for query in queries]
         if self.batches and len(queries) > 1:
             answer = self.policy.infer_batch(inputs, noise=np.stack(noise))["actions"]
@@ -160,19 +161,6 @@ class OpenPi(ModelPolicy):
 
     def _noise(self, seed: int) -> Chunk:
         return np.random.default_rng(seed).standard_normal(self.shape, np.float32)
-
-
-def _observation(query: Query) -> dict[str, Any]:
-    """What the Aloha input transform takes: images (3, H, W), no other camera."""
-    images = query.observation["images"]
-    return {
-        "state": np.array(query.observation["state"], np.float32),
-        "images": {
-            theirs: np.ascontiguousarray(images[ours].transpose(2, 0, 1))
-            for theirs, ours in CAMERAS.items()
-        },
-        "prompt": query.observation["instruction"],
-    }
 
 
 def create(options: OpenPiServerOptions) -> OpenPi:
