@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, make_dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any
 
 import numpy as np
 from msgspec import Meta
@@ -369,9 +369,8 @@ def dialect(name: str, **more: Any) -> Dialect:
     other fields of it."""
     preset = PRESETS[name]
     chosen = read_options(FamilyOptions, preset.options)
-    hints = get_type_hints(FamilyOptions, include_extras=True)
     changed = [
-        (f.name, hints[f.name], option(getattr(chosen, f.name), **f.metadata))
+        (f.name, f.type, option(getattr(chosen, f.name), **f.metadata))
         for f in fields(FamilyOptions)
         if f.name in preset.options
     ]

@@ -396,13 +396,17 @@ def test_a_server_that_cannot_answer_is_refused_before_the_first_trial() -> None
         probe(url, {"timeouts": QUICK}, look=True)
 
 
-def test_vllm_is_told_of_a_trial_and_answers_the_actions_themselves() -> None:
-    rows = np.ones((50, 32), np.float32)
-    metadata = {"image_resolution": [224, 224]}
-    server = Preset("vllm", metadata, {"status": "reset successful"}, rows)
+def test_vllm_and_lingbot_are_told_of_a_trial_and_have_names_of_their_own() -> None:
+    done = {"status": "reset successful"}
+    server = Preset("vllm", {"image_resolution": [1, 1]}, done, np.ones((50, 32), np.float32))
     assert answered(server).shape == (50, 14)
     assert server.requests[0] == {"endpoint": "reset"}
     assert server.requests[1]["images"]["observation.images.base_0_rgb"].shape == (240, 320, 3)
+    server = Preset("lingbot", {}, {"action": None}, {"action": joint_chunk()})
+    assert np.array_equal(answered(server), joint_chunk().astype(np.float32))
+    assert server.requests[0] == {"reset": True, "robo_name": "robotwin"}
+    names = [f"observation.images.cam_{name}" for name in ("high", "left_wrist", "right_wrist")]
+    assert sorted(server.requests[1]) == sorted([*names, "observation.state", "task"])
 
 
 def test_an_idle_connection_is_made_anew_to_the_same_server_alone() -> None:
@@ -416,14 +420,6 @@ def test_an_idle_connection_is_made_anew_to_the_same_server_alone() -> None:
         time.sleep(0.02)
         with pytest.raises(ConnectionLost, match="another server"):
             policy.infer(observation())
-
-
-def test_lingbot_has_its_names_at_the_top_and_is_reset() -> None:
-    server = Preset("lingbot", {}, {"action": None}, {"action": joint_chunk()})
-    assert np.array_equal(answered(server), joint_chunk().astype(np.float32))
-    assert server.requests[0] == {"reset": True, "robo_name": "robotwin"}
-    names = [f"observation.images.cam_{name}" for name in ("high", "left_wrist", "right_wrist")]
-    assert sorted(server.requests[1]) == sorted([*names, "observation.state", "task"])
 
 
 @pytest.mark.parametrize(
@@ -446,9 +442,3 @@ def test_a_server_of_ones_own_is_a_file(tmp_path: Path) -> None:
     with talking(server, **client_options("openpi://host", file)) as policy:
         policy.infer(observation(images={HEAD: image(HEAD)}))
     assert np.array_equal(server.requests[0]["top"], image(HEAD))
-
-
-@pytest.mark.parametrize("option", ["order=0-12", "size=0", "reset=[]"])
-def test_a_preset_that_cannot_be(option: str) -> None:
-    with pytest.raises(ValueError, match=option.partition("=")[0]):
-        client_options(f"openpi://host?{option}", None)
