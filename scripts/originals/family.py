@@ -41,7 +41,7 @@ def module(checkout: str, name: str) -> Any:
 
 
 def port_of() -> int:
-    port = int(os.environ.get("ROBOSPA_PORT", "0")) or free_port()
+    port = free_port()
     report({"port": port})
     return port
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import socket
 import sys
 from collections.abc import Callable
@@ -124,6 +125,9 @@ def report(value: Any) -> None:
 
 
 def free_port() -> int:
+    """ROBOSPA_PORT if that is set."""
+    if given := os.environ.get("ROBOSPA_PORT"):
+        return int(given)
     with socket.socket() as sock:
         sock.bind(("127.0.0.1", 0))
         port: int = sock.getsockname()[1]
