@@ -12,13 +12,7 @@ from msgspec import structs
 
 from robospa.extras import MissingPackage
 from robospa.results.failures.labels import FailedTrials
-from robospa.results.lint import (
-    Finding,
-    lint_faults,
-    lint_published,
-    lint_run,
-    lint_runs,
-)
+from robospa.results.lint import Finding, lint_faults, lint_published, lint_run, lint_runs
 from robospa.results.records.manifest import RunError
 from robospa.results.records.runs import Run, read_run, to_line
 from robospa.results.records.trial_record import RetryRow, TrialRecord
@@ -253,11 +247,7 @@ WRONG = shown(
         "first_unreachable": "the left arm cannot reach it",
     },
 )
-ROWS = [
-    shown("Pick_It", 1, 7, True),
-    WRONG,
-    shown("Pick_It", 2, 9, False, end="infrastructure"),
-]
+ROWS = [shown("Pick_It", 1, 7, True), WRONG, shown("Pick_It", 2, 9, False, end="infrastructure")]
 
 
 @pytest.fixture
@@ -268,16 +258,14 @@ def run(tmp_path: Path) -> Run:
 def test_a_row_for_every_listed_trial_and_nothing_said_of_those_without_a_result(run: Run) -> None:
     columns = trial_columns(run)
     assert {len(column) for column in columns.values()} == {4}
-    by_seed = {seed: n for n, seed in enumerate(columns["seed"])}
-    ends = {seed: columns["end"][n] for seed, n in by_seed.items()}
-    assert ends == {7: "success", 8: "step_limit", 9: "infrastructure", 900: "not run"}
-    success = {seed: columns["success"][n] for seed, n in by_seed.items()}
-    assert success == {7: True, 8: False, 9: None, 900: None}
-    failed = by_seed[8]
-    assert columns["failure"][failed] == "target grounding"
-    assert "the <small> cube" in columns["evidence"][failed]
-    assert columns["unreachable_actions"][failed] == 6
-    assert columns["progress"][by_seed[7]] == 1.0
+
+    def of(name: str) -> dict[Any, Any]:
+        return dict(zip(columns["seed"], columns[name], strict=True))
+
+    assert of("end") == {7: "success", 8: "step_limit", 9: "infrastructure", 900: "not run"}
+    assert of("success") == {7: True, 8: False, 9: None, 900: None}
+    assert of("failure")[8] == "target grounding" and "the <small> cube" in of("evidence")[8]
+    assert of("unreachable_actions")[8] == 6 and of("progress")[7] == 1.0
 
 
 def test_rows_are_written_as_csv_without_pandas(run: Run, tmp_path: Path) -> None:

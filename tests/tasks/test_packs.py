@@ -84,8 +84,3 @@ def test_an_asset_of_another_package_is_found_and_replaces_none(
             object_model("ball")
     else:
         assert object_model("ball").asset == "ball" and "ball" not in objects.assets()
-
-
-def test_an_asset_that_nobody_offers_is_unknown() -> None:
-    with pytest.raises(KeyError, match="no asset 'bal'; "):
-        object_model("bal")

@@ -86,8 +86,9 @@ def test_beside_a_run_published_models_get_no_heat_map(tmp_path: Path) -> None:
     assert [n for n in made if n.startswith("heat")] == ["heat-1"]
 
 
-def test_the_same_data_make_the_same_bytes(drawn: Path, tmp_path: Path) -> None:
-    made = [drawing.name for drawing in draw([small_run()], tmp_path)]
+def test_the_same_data_in_any_order_make_the_same_bytes(drawn: Path, tmp_path: Path) -> None:
+    one = small_run()
+    made = [d.name for d in draw([replace(one, records=one.records[::-1])], tmp_path)]
     assert made == ["success", "progress", "latency", "failures", "heat"]
     for path in drawn.iterdir():
         assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
@@ -122,13 +123,6 @@ def test_a_figure_in_the_page_takes_its_colours_and_keeps_its_ids_apart(drawn: P
     assert "http" not in svg
     assert 'id="success-figure_1"' in svg
     assert "a &#34;label&#34;" in svg
-
-
-def test_a_series_keeps_its_trials_order_free(drawn: Path, tmp_path: Path) -> None:
-    one = small_run()
-    draw([replace(one, records=tuple(reversed(one.records)))], tmp_path, SVG)
-    for name in ("latency.svg", "failures.svg"):
-        assert (drawn / name).read_bytes() == (tmp_path / name).read_bytes()
 
 
 @pytest.mark.parametrize("make", [draw_latency, draw_levels, draw_progress])

@@ -40,6 +40,11 @@ def folder(tmp_path: Path, going: ExitStack) -> Path:
     return run.folder
 
 
+def card_of(page: str) -> str:
+    """The text of the summary's first number, and all that follows."""
+    return " ".join(re.sub("<[^>]*>", " ", page.split('<div class="big">', 1)[1]).split())
+
+
 def page_of(folder: Path) -> str:
     live = LiveReport(folder)
     try:
@@ -76,7 +81,7 @@ def test_lost_trials_of_a_run_in_progress_are_missing(folder: Path) -> None:
 
 def test_the_live_page_shows_the_rate_so_far_with_its_interval(folder: Path) -> None:
     page = page_of(folder)
-    card = " ".join(re.sub("<[^>]*>", " ", page.split('<div class="big">', 1)[1]).split())
+    card = card_of(page)
     found = wilson(3, 4)
     interval = f"95 % interval [{100 * found.low:.1f}, {100 * found.high:.1f}]"
     assert f"75.0 % {interval}" in card
@@ -99,8 +104,7 @@ def test_averages_of_a_live_page_are_over_what_has_finished(folder: Path) -> Non
 def test_a_stopped_run_shows_no_rate_over_what_it_lacks(folder: Path, going: ExitStack) -> None:
     going.close()
     page = page_of(folder)
-    card = " ".join(re.sub("<[^>]*>", " ", page.split('<div class="big">')[1]).split())
-    assert "no value: results are missing" in card
+    assert "no value: results are missing" in card_of(page)
     assert "10 of 14 trials are missing" in page
 
 
