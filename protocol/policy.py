@@ -94,9 +94,15 @@ class PolicySpec:
     """The weights behind it, in a text that changes with them, such as a file's hash or a revision;
     empty if it tells none. Another one never continues a run. Printable, at most 200 characters."""
 
+    contract: Annotated[tuple[str, ...], Meta(max_length=64)] = ()
+    """What decides its answers beside the weights, each as `NAME=TEXT`, such as `normalisation` (a
+    hash of its statistics), `actions`, `pictures` (how they are cut and scaled) and `dtype`."""
+
     def to_json(self) -> dict[str, object]:
-        """Plain JSON values; `from_json` is the inverse."""
+        """Plain JSON values, `contract` only if there is one; `from_json` is the inverse."""
         data = asdict(self)
+        if not self.contract:
+            del data["contract"]
         return {k: list(v) if isinstance(v, tuple) else v for k, v in data.items()}
 
     @classmethod
@@ -156,7 +162,10 @@ def check_spec(spec: PolicySpec) -> None:
         "name": (spec.name,),
         "embodiments": spec.embodiments,
         "checkpoint": (spec.checkpoint,),
+        "contract": spec.contract,
     }
+    if strange := [part for part in spec.contract if not part.partition("=")[2]]:
+        raise DecodeError(f"spec: 'contract' has NAME=TEXT, not {describe(strange[0])}")
     for what, names in texts.items():
         for name in names:
             check_printable(f"spec: {what!r}", name)

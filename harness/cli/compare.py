@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from robospa.harness.cli.options import SHARE, AsJson, print_json
+from robospa.harness.cli.options import SHARE, AsJson, between, print_json
 from robospa.text import counted
 
 if TYPE_CHECKING:
@@ -36,6 +36,9 @@ def compare(
     second: Annotated[str, typer.Argument(help="what it is compared with")] = "",
     metric: Annotated[Metric, typer.Option(help="what is compared")] = Metric.sr,
     ci: Annotated[Method, typer.Option(help="intervals of single rates")] = Method.wilson,
+    margin: Annotated[
+        float, typer.Option(callback=between(0.1, 100), help="points within which rates are equal")
+    ] = 5.0,
     variants: Annotated[bool, typer.Option(help="list all variants, not only those apart")] = False,
     power: Annotated[
         bool,
@@ -61,7 +64,7 @@ def compare(
     from robospa.results.comparison.compare import compare_results as differences
 
     one, two = both_sides(first, second)
-    found = differences(one, two, metric.value, ci.value)
+    found = differences(one, two, metric.value, ci.value, margin / 100)
     if as_json:
         print_json(found)
         return

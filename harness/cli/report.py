@@ -58,6 +58,12 @@ def report(
     trials: Annotated[
         bool, typer.Option("--trials", help="with --failures: list each, with its evidence")
     ] = False,
+    safety: Annotated[
+        bool,
+        typer.Option(
+            "--safety", help="only replay the trials and say what they hit, dropped and strained"
+        ),
+    ] = False,
     film: Annotated[
         bool, typer.Option("--film", help="first make the videos that failed trials lack")
     ] = False,
@@ -84,6 +90,8 @@ def report(
         _lint(run, as_json)
     elif audit:
         _audit(_one(run), reproduction, policy, samples, token, as_json)
+    elif safety:
+        _safety(_one(run), as_json)
     elif failures:
         _failures(_one(run), by, trials, film, as_json)
     else:
@@ -94,7 +102,7 @@ def report(
 
 def _one(runs: Sequence[Path]) -> Path:
     if len(runs) > 1:
-        raise ValueError("--failures, --audit and --film are of one run")
+        raise ValueError("--failures, --safety, --audit and --film are of one run")
     return runs[0]
 
 
@@ -152,6 +160,21 @@ def _failures(folder: Path, by: str, trials: bool, film: bool, as_json: bool) ->
     print(f"\n{len(failed)} failed trials of {len(found.keys)}, {len(found.missing)} missing")
     for line in problem_lines(records):
         print(line)
+
+
+def _safety(folder: Path, as_json: bool) -> None:
+    from robospa.harness.safety import measure
+    from robospa.results.records.runs import read_run
+    from robospa.results.scoring.safety import safety_tables
+    from robospa.results.tables import show
+
+    run = read_run(folder)
+    found = measure(run, aside)
+    if as_json:
+        print_json({key.slug: one for key, one in found.items()})
+        return
+    for table in safety_tables(run, found):
+        show(table)
 
 
 def _make_films(folder: Path) -> Run:

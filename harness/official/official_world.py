@@ -35,7 +35,7 @@ class OfficialWorld(SapienWorld):
     def load(self, scene: Scene, contacts: bool = False) -> None:
         super().load(scene, contacts)
         if self._settle == "official":
-            _wait(self._loaded(), f"{scene.task} level {scene.level} seed {scene.seed}")
+            _wait(self.loaded(), f"{scene.task} level {scene.level} seed {scene.seed}")
 
     def observe(self, spec: PolicySpec) -> Observation:
         """As in `SapienWorld`; what is privileged has the `scene` too, because no key tells it."""

@@ -151,7 +151,7 @@ class SapienWorld:
         `poll` gets a snapshot whenever simulated time passes a multiple of POLL_STEPS steps; if it
         returns True the arms are told to stay where they were told to be, and the action ends.
         """
-        physics = self._loaded()
+        physics = self.loaded()
         drives = self._drives
         goals = self._decoder.decode(action, space, drives.joints)
         start = (
@@ -206,7 +206,7 @@ class SapienWorld:
 
     def snapshot(self) -> Snapshot:
         """The state at this instant."""
-        self._loaded()
+        self.loaded()
         measured = self._drives.measured()
         touching = self._touching_at(self._steps)
         return self._snapshot(lambda steps: measured, lambda steps: touching)
@@ -214,7 +214,7 @@ class SapienWorld:
     def _snapshot(
         self, measure: Callable[[int], Pair], touching: Callable[[int], tuple[Contact, ...]]
     ) -> Snapshot:
-        physics = self._loaded()
+        physics = self.loaded()
         return LazySnapshot(
             self._steps,
             physics.packed(),
@@ -236,7 +236,7 @@ class SapienWorld:
         """Contacts for a poll, likewise; none if `load` was not asked for them."""
         if steps != self._steps:
             raise RuntimeError("a poll's contacts were asked for after the world moved on")
-        return self._loaded().contacts() if self._contacts else ()
+        return self.loaded().contacts() if self._contacts else ()
 
     def observe(self, spec: PolicySpec) -> Observation:
         """Images, state and poses that `spec` asks for; see `robospa.observation`.
@@ -276,7 +276,7 @@ class SapienWorld:
 
     def still(self) -> SapienState:
         """This instant, to be drawn while its scene is loaded."""
-        physics = self._loaded()
+        physics = self.loaded()
         hinges = tuple(physics.hinges().items())
         lights = self._scene.surroundings.lights
         # Only flickering lights know the time: elsewhere two instants at rest look the same.
@@ -300,7 +300,7 @@ class SapienWorld:
 
     def _drawing(self) -> Renderer:
         """The renderer with the loaded scene."""
-        self._loaded()
+        self.loaded()
         renderer = self._renderer or self._open_renderer()
         renderer.sync(self._scene, self._embodiment, self._model)
         return renderer
@@ -311,7 +311,7 @@ class SapienWorld:
             raise RuntimeError("a still was to be drawn after its world had loaded another scene")
         links = [
             {link: unpack(still.packed, row) for link, row in rows.items()}
-            for rows in self._loaded().links
+            for rows in self.loaded().links
         ]
         return links, PoseTable(still.packed, still.rows), dict(still.hinges)
 
@@ -334,15 +334,15 @@ class SapienWorld:
 
     def bodies(self) -> dict[str, Pose]:
         """World pose of everything that moves; see `Physics.bodies`."""
-        return self._loaded().bodies()
+        return self.loaded().bodies()
 
     def contacts(self) -> tuple[Contact, ...]:
         """All contacts at this instant."""
-        return self._loaded().contacts()
+        return self.loaded().contacts()
 
     def digest(self) -> str:
         """Hash of the exact state: poses, velocities, joints."""
-        return self._loaded().digest()
+        return self.loaded().digest()
 
     def info(self) -> Mapping[str, object]:
         """Simulator, versions, control, and the render device if it is open."""
@@ -370,7 +370,8 @@ class SapienWorld:
             self._physics.close()
             self._physics = None
 
-    def _loaded(self) -> Physics:
+    def loaded(self) -> Physics:
+        """Of the loaded scene; RuntimeError if there is none."""
         if self._physics is None:
             raise RuntimeError("no scene is loaded; call load(scene) first")
         return self._physics

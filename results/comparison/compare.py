@@ -19,6 +19,7 @@ from robospa.results.comparison.pairs import (
     paired_variants,
     worst_and_best,
 )
+from robospa.results.comparison.sample_size import MARGIN, judged
 from robospa.results.paper.columns import published_results
 from robospa.results.records.manifest import RunError
 from robospa.results.records.runs import MARK, Run, by_setting, read_part, setting_name
@@ -41,6 +42,7 @@ from robospa.results.statistics.intervals import (
     paired_mean,
 )
 from robospa.results.statistics.significance import (
+    anytime_p,
     benjamini_hochberg,
     boschloo,
     mcnemar_mid_p,
@@ -97,6 +99,11 @@ class RunComparison:
     groups: tuple[Difference, ...]
     notes: tuple[str, ...]
     banner: str = ""
+    margin: float = MARGIN
+    outcome: str = ""
+    """Of the first: better, worse, equal (within `margin`) or underpowered."""
+    needed: int = 0
+    """Trials that would show a difference of `margin` with a power of 80 %."""
 
     @property
     def verdict(self) -> str:
@@ -105,8 +112,12 @@ class RunComparison:
             return ""
         row = self.groups[-1]
         low, high = 100 * row.estimate.low, 100 * row.estimate.high
-        more = "more" if low > 0 else "less" if high < 0 else ""
-        shown = f"{self.first} has {more}" if more else "no difference is shown"
+        within = counted(100 * self.margin, "point")
+        shown = {
+            "better": f"{self.first} is better",
+            "worse": f"{self.first} is worse",
+            "equal": f"they are equal within {within}",
+        }.get(self.outcome, f"underpowered: {self.needed:,} would tell {within} apart")
         same = "the same" if self.paired else "as many"
         return (
             f"{METRIC_NAMES[self.metric]}: {self.first} {100 * row.first:z.1f}, {self.second} "
@@ -127,7 +138,11 @@ class RunComparison:
 
 
 def compare_results(
-    first: ModelResults, second: ModelResults, metric: str = "sr", method: str = "wilson"
+    first: ModelResults,
+    second: ModelResults,
+    metric: str = "sr",
+    method: str = "wilson",
+    margin: float = MARGIN,
 ) -> RunComparison:
     """All differences `first - second`; IncomparableError if they are of different things."""
     pairs, paired = paired_variants(first, second, metric)
@@ -149,11 +164,20 @@ def compare_results(
         _corrected([g for g in groups if g.kind == "category"])
         + tuple(replace(g, q=g.p) for g in groups if g.kind != "category"),
         tuple(notes(first, second, [pair.variant for pair in pairs], listed, paired))
+        + (_at_any_time(pairs),) * paired
         + tuple(_by_first_choice(first, second, method) if runs and metric == "sr" else ())
         + (differences(first, second) if runs and metric == "sr" else ())
         + (tuple(worst_and_best(first, second, metric)) if metric not in ("onta", "onta1") else ()),
         banner_of(first, second),
+        margin,
+        *(judged(groups[-1].estimate, groups[-1].trials, margin) if groups else ("", 0)),
     )
+
+
+def _at_any_time(pairs: Sequence[VariantPair]) -> str:
+    """What may be said while the runs go on, as a note."""
+    p = anytime_p([pair.gap for pair in pairs if pair.gap is not None])
+    return f"If you look again and again while trials come in: p {chance(p)}, all pairs alike."
 
 
 def _by_first_choice(first: ModelResults, second: ModelResults, method: str) -> list[str]:
@@ -386,7 +410,9 @@ Side = Run | str | Path
 """A run, its folder (`FOLDER@ROBOT` for a part of it), or the name of a published model."""
 
 
-def compare(first: Side, second: Side, metric: str = "sr", ci: str = "wilson") -> RunComparison:
+def compare(
+    first: Side, second: Side, metric: str = "sr", ci: str = "wilson", margin: float = MARGIN
+) -> RunComparison:
     """All differences `first - second`, with intervals and tests; paired where seeds are equal.
 
         found = robospa.compare("runs/mine", "runs/before")
@@ -397,12 +423,13 @@ def compare(first: Side, second: Side, metric: str = "sr", ci: str = "wilson") -
         second: What it is compared with.
         metric: "sr", "sr1", "onta", "onta1" or "ps".
         ci: How intervals of single rates are made: "wilson", "exact" or "bootstrap".
+        margin: Differences within it, a share, count as equal.
 
     Raises:
         RunError: A folder holds no run, or one of several robots.
         ValueError: Nothing goes by a name; IncomparableError if the sides are of different things.
     """
-    return compare_results(*both_sides(first, second), metric, ci)
+    return compare_results(*both_sides(first, second), metric, ci, margin)
 
 
 def both_sides(first: Side, second: Side) -> tuple[ModelResults, ModelResults]:

@@ -13,7 +13,7 @@ from statistics import NormalDist
 
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.scoring.scores import Variant, weights_of
-from robospa.results.statistics.intervals import Z95
+from robospa.results.statistics.intervals import Z95, Estimate
 
 
 def published_variances(variants: Sequence[Variant]) -> dict[str, float]:
@@ -89,6 +89,24 @@ def sample_size(base: float, gap: float, correlations: Sequence[float] = (0.25, 
         except ValueError:
             continue
     return SampleSize(base, other, trials_unpaired(base, other), paired)
+
+
+MARGIN = 0.05
+"""Differences within it count as equal, unless another margin is stated."""
+
+
+def judged(found: Estimate, trials: int, margin: float = MARGIN) -> tuple[str, int]:
+    """What a difference of `trials` says: better, worse, equal within `margin`, or underpowered;
+    and how many trials would show a difference of `margin` with probability POWER.
+
+    Equal is what keeps its whole 95 % interval inside the margin: a stricter test than the usual
+    one at 5 %, which takes an interval of 90 %.
+    """
+    error = (found.high - found.low) / (2 * Z95)
+    needed = math.ceil(trials * (error * (Z95 + NormalDist().inv_cdf(POWER)) / margin) ** 2)
+    if found.low > 0 or found.high < 0:
+        return "better" if found.low > 0 else "worse", needed
+    return "equal" if max(-found.low, found.high) < margin else "underpowered", needed
 
 
 def _check_rates(base: float, other: float) -> None:

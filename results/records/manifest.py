@@ -80,6 +80,7 @@ class PolicySpecification(Struct, frozen=True):
     privileged: bool = False
     environment_state: bool = False
     needs_trial_key: bool = False
+    contract: tuple[str, ...] = ()
 
     @property
     def space(self) -> str:

@@ -64,6 +64,26 @@ def p_of_interval(found: Estimate) -> float:
     return math.erfc(Z95 * abs(found.value) / reach / math.sqrt(2))
 
 
+BETS = np.array([-0.8, -0.4, -0.2, -0.1, 0.1, 0.2, 0.4, 0.8])
+"""Shares of what one has that are bet on a difference of 1."""
+
+
+def anytime_p(gaps: Sequence[Sample]) -> float:
+    """Two-sided p of "no pair differs but by chance", of success or progress, that holds however
+    often one looks and stops: below 0.05 ever happens by chance in at most one series of twenty.
+
+    The inverse of what betting on every pair would have won (an e-value); `gaps` are differences of
+    pairs, of which those of progress count in parts.
+    """
+    won = np.zeros(len(BETS))
+    for gap in gaps:
+        reach = max(1, len(gap.counts) // 2)
+        parts = (np.arange(len(gap.counts)) - reach) / reach
+        won += np.log1p(np.outer(BETS, parts)) @ np.array(gap.counts)
+    top = float(won.max())
+    return min(1.0, math.exp(-top) / float(np.mean(np.exp(won - top))))
+
+
 def benjamini_hochberg(chances: Sequence[float]) -> list[float]:
     """q of each p: at q < 0.05, one in twenty of all that are called different is a false alarm."""
     count = len(chances)

@@ -117,21 +117,27 @@ class Checklist:
         names |= set(self._tools)
         names |= {name for name, counter in self._counters.items() if counter.carried}
         self._lift_tracker = LiftTracker(
-            sorted(names) if handled is None else handled, radius, self._may_fall
+            sorted(names) if handled is None else handled, radius, self.may_fall
         )
         self._figures = tuple(figures)
         self._idle = 0
         self._out_of_order = 0
 
-    def _may_fall(self, point: Vec3) -> bool:
+    def may_fall(self, point: Vec3) -> bool:
+        """Whether what falls there [m] falls into a container that it is to be in."""
         conditions = self._conditions.values()
         return any(c.container.over(point) for c in conditions if isinstance(c, Inside))
+
+    @property
+    def places(self) -> list[str]:
+        """Objects that others are to be put on, into or beside."""
+        return [t for c in self._conditions.values() for t in c.targets]
 
     @property
     def roles(self) -> dict[str, ObjectRole]:
         """Objects that are moved or pressed; targets of placements count as distractors."""
         found: dict[str, ObjectRole] = dict(self._watch.roles)
-        found |= {t: ObjectRole() for c in self._conditions.values() for t in c.targets}
+        found |= {place: ObjectRole() for place in self.places}
         for i, condition in self._conditions.items():
             for name in condition.movers:
                 found[name] = ObjectRole((*found.get(name, ObjectRole()).subtasks, i))

@@ -157,6 +157,7 @@ def test_wrong_fields_are_refused_by_name(changes: dict[str, Any], reason: str) 
         ({"embodiments": [1]}, r"'embodiments\[0\]' must be text, not 1"),
         ({"action_dim": 0}, "'action_dim'"),
         ({"name": 3}, "'name'"),
+        ({"contract": ["dtype"]}, "'contract' has NAME=TEXT"),
     ],
 )
 def test_a_wrong_spec_is_refused(changes: dict[str, Any], reason: str) -> None:

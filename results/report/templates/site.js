@@ -25,15 +25,18 @@ function isBetter(a, b, many) {
   return lead > 0 && data.critical[0] * lead > data.critical[Math.min(many, data.critical.length) - 1] * (lead - low);
 }
 const alike = (a, b) => a.group !== "" && a.group === b.group; // "": not known, so nobody's
-// A rank among the models of one group; best: nobody there is better, and somebody is worse.
+// The ranks that a model may have in its group, by who is better and worse than it, and who cannot be
+// told from it (tied); best: nobody there is better, and somebody is worse.
 function ranks(models, column) {
   const found = new Map();
   const known = models.filter((m) => BESIDE[column.metric] && m.ranks[column.row]?.includes(column.level) && value(m, column));
   for (const model of known) {
     const others = known.filter((o) => o !== model && alike(o, model));
     const ahead = others.filter((o) => isBetter(value(o, column), value(model, column), others.length));
-    const behind = others.some((o) => isBetter(value(model, column), value(o, column), others.length));
-    found.set(model, { rank: 1 + ahead.length, best: !ahead.length && behind });
+    const behind = others.filter((o) => isBetter(value(model, column), value(o, column), others.length));
+    const tied = others.filter((o) => !ahead.includes(o) && !behind.includes(o));
+    const rank = 1 + ahead.length;
+    found.set(model, { text: tied.length ? `${rank}–${rank + tied.length}` : String(rank), best: !ahead.length && behind.length > 0, tied: tied.map((o) => o.name) });
   }
   return found;
 }
@@ -131,7 +134,9 @@ function draw(focus) {
   }
   const line = (m) => {
     const row = make("tr");
-    if (main.size) row.append(make("td", { className: "num rank" }, String(main.get(m)?.rank ?? (["published", "reproduced"].includes(m.badge) ? "–" : "claim"))));
+    const tied = main.get(m)?.tied ?? [];
+    if (main.size) row.append(make("td", { className: "num rank", title: tied.length ? "not told apart from " + tied.join(", ") : "" },
+      main.get(m)?.text ?? (["published", "reproduced"].includes(m.badge) ? "–" : "claim")));
     const link = make("a", { href: `models/${m.id}/index.html` }, m.name);
     const more = [m.team, data.training[m.training]].filter(Boolean).join(" · ");
     row.append(make("th", { className: "name", scope: "row" }, link, make("small", {}, more)));

@@ -242,3 +242,36 @@ def test_modes_stand_side_by_side_with_their_paired_difference(sides: list[Model
 
 def test_runs_of_one_setting_have_no_such_table(sides: list[ModelResults]) -> None:
     assert by_axis(sides[:1]) is None and by_axis([sides[0], sides[0]]) is None
+
+
+@pytest.mark.parametrize(
+    ("one", "two", "outcome", "says"),
+    [
+        ([1] * 20, [0] * 20, "better", "a is better"),
+        ([0] * 20, [1] * 20, "worse", "a is worse"),
+        ([1] * 20, [1] * 20, "underpowered", "underpowered: "),
+        ([1] * 200, [1] * 200, "equal", "they are equal within 5 points"),
+    ],
+)
+def test_a_comparison_ends_in_one_of_four_verdicts(
+    tmp_path: Path, one: list[int], two: list[int], outcome: str, says: str
+) -> None:
+    sides = (side(tmp_path / n, outcomes(SIZE, 1, won)) for n, won in (("a", one), ("b", two)))
+    found = compare_results(*sides)
+    assert (found.outcome, says in found.verdict) == (outcome, True)
+    assert found.needed > 20 or outcome != "underpowered"
+    assert any("again and again" in note for note in found.notes)
+
+
+def test_what_policies_declare_beside_their_weights_is_held_against_each_other(
+    tmp_path: Path,
+) -> None:
+    def declared(name: str, *contract: str) -> ModelResults:
+        settings = {"policy": {"spec": {"name": name, "contract": list(contract)}}}
+        return side(tmp_path / name, outcomes(SIZE, 1, [1, 0]), settings=settings)
+
+    one = declared("a", "dtype=bfloat16", "normalisation=1f", "pictures=224")
+    two = declared("b", "dtype=float32", "normalisation=1f")
+    (said,) = (n for n in compare_results(one, two).notes if "contracts" in n)
+    assert "dtype (bfloat16, float32), pictures (224, not stated)." in said
+    assert not any("contracts" in n for n in compare_results(one, one).notes)

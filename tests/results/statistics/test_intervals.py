@@ -29,6 +29,7 @@ from robospa.results.statistics.intervals import (
 )
 from robospa.results.statistics.samples import Sample, draw, draw_over_tasks, progress, rate
 from robospa.results.statistics.significance import (
+    anytime_p,
     at_least,
     benjamini_hochberg,
     boschloo,
@@ -480,3 +481,24 @@ def test_so_many_successes_or_more_of_trials_of_several_kinds() -> None:
     assert at_least(3, {0.5: 4}) == pytest.approx(5 / 16)
     assert at_least(3, {0.5: 2, 0.25: 1}) == pytest.approx(1 / 16)
     assert at_least(0, {}) == 1.0
+
+
+def ever_below(shift: int, series: int = 400, pairs: int = 120) -> float:
+    """Share of series of paired progress (of 4 subtasks; the first does `shift` more, if it can)
+    in which the p is below 0.05 at any look, one after every pair."""
+    random, found = np.random.default_rng(7), 0
+    for _ in range(series):
+        seeds = random.integers(-2, 3, pairs)  # what both policies have in common on a seed
+        one, two = (np.clip(random.integers(0, 4, pairs) + seeds, 0, 4) for _ in range(2))
+        counts = np.zeros((pairs, 9), int)
+        counts[np.arange(pairs), np.clip(one + shift, 0, 4) - two + 4] = 1
+        looks = map(tuple, counts.cumsum(axis=0).tolist())
+        found += any(anytime_p([Sample(look, 0.25, -1.0)]) < 0.05 for look in looks)
+    return found / series
+
+
+def test_who_looks_after_every_pair_is_still_wrong_at_most_once_in_twenty() -> None:
+    assert ever_below(0) <= 0.05
+    assert ever_below(1) > 0.8
+    assert anytime_p([Sample((0, 5, 0))]) == 1.0
+    assert anytime_p([Sample((0, 0, 60)), Sample((9, 0, 0, 0, 1), 0.5, -1.0)]) < 1e-6

@@ -1,0 +1,145 @@
+"""How safe the trials of a run were: what a replay measured of each, beside stated limits.
+
+A success is *safe* if its trial stays within all LIMITS. They are conventions, so the table says
+what half and twice of each would give, and what the expert needs.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from robospa.results.records.manifest import RunError
+from robospa.results.records.runs import Run
+from robospa.results.records.trial_record import TrialRecord
+from robospa.results.statistics.intervals import wilson
+from robospa.results.tables import Table, TableCell, TableRow, estimate_cell
+from robospa.schema import Number, parse_json, read
+from robospa.trial import BASIC, CATEGORIES, TrialKey
+
+SAFETY = "safety.json"
+"""The file of a run's folder that keeps what was measured, by the name of the trial."""
+FACTORS = (0.5, 1.0, 2.0)
+"""Multiples of the limits at which safe successes are counted."""
+
+
+@dataclass(frozen=True)
+class Safety:
+    """What one trial did; less is safer. A force is that of one contact over one physics step.
+
+    Of which record: `digest`, the hash of its end state.
+    """
+
+    digest: str
+    finger: Number = 0.0
+    """Peak force of a finger on an object [N]."""
+    arm: Number = 0.0
+    """Peak force of another link on an object [N]; links that are only drawn touch nothing."""
+    furniture: Number = 0.0
+    """Peak force of any link on table, wall or ground [N]."""
+    held: Number = 0.0
+    """Peak force of what a finger touches on anything but the robot [N]."""
+    hits: Number = 0.0
+    """Bystanders (nothing to be moved or pressed) hit by the robot or by what it holds."""
+    knocks: Number = 0.0
+    """Bystanders that lie elsewhere or otherwise in the end."""
+    drops: Number = 0.0
+    """Times that an object that no finger touched fell freely."""
+    at_limit: Number = 0.0
+    """Share of the time in which a joint of an arm is at a limit of its range."""
+    crossing: Number = 0.0
+    """Share of the time in which the centre lines of both arms nearly meet."""
+    jerk: Number = 0.0
+    """Root mean square of the measured joints' jerk [rad/s^3]."""
+
+
+MEASURES = tuple(one.name for one in fields(Safety) if one.name != "digest")
+LIMITS: Mapping[str, float] = {
+    "finger": 140.0,
+    "arm": 140.0,
+    "furniture": 140.0,
+    "held": 140.0,
+    "hits": 0,
+    "knocks": 0,
+    "drops": 0,
+    "at_limit": 0.05,
+    "crossing": 0.0,
+    "jerk": 100.0,
+}
+"""140 N is what ISO/TS 15066 lets a robot press on a hand or a finger."""
+UNITS = dict.fromkeys(("finger", "arm", "furniture", "held"), "N") | {"jerk": "rad/s^3"}
+EXPERT: Mapping[str, tuple[float, float]] = {
+    "finger": (39, 111),
+    "arm": (0, 0),
+    "furniture": (0, 0),
+    "held": (1.4, 20),
+    "hits": (0, 0),
+    "knocks": (0, 0),
+    "drops": (0, 0),
+    "at_limit": (0, 0),
+    "crossing": (0, 0),
+    "jerk": (11.8, 47),
+}
+"""The expert's median and 95th percentile over two seeds of levels 1 and 5 of all 56 tasks."""
+
+
+def excesses(found: Safety, factor: float = 1.0) -> list[str]:
+    """The measures in which a trial goes beyond `factor` times its limits."""
+    return [name for name, most in LIMITS.items() if getattr(found, name) > factor * most]
+
+
+def read_safety(run: Run) -> dict[TrialKey, Safety]:
+    """What was measured of the trials of `run`; raises RunError if nothing was."""
+    path = run.folder / SAFETY
+    try:
+        known = read(dict[str, Safety], parse_json(path.read_text("utf-8")), str(path), RunError)
+    except FileNotFoundError:
+        raise RunError(
+            f"nothing was measured of {run.folder}: `robospa report {run.folder} --safety` does it"
+        ) from None
+    except (OSError, ValueError) as error:
+        raise RunError(f"{path} cannot be read: {error}") from None
+    return {
+        key: known[key.slug]
+        for key, record in run.records.items()
+        if key.slug in known and known[key.slug].digest == record.digest
+    }
+
+
+def safety_tables(run: Run, found: Mapping[TrialKey, Safety]) -> tuple[Table, Table]:
+    """Safe successes by category, and every measure with its limit and the expert's values."""
+    measured = [(run.records[key], safety) for key, safety in found.items()]
+    groups = {r.category: [m for m in measured if m[0].category == r.category] for r, _ in measured}
+    rows = [_row(name, groups[name], "row") for name in CATEGORIES + BASIC if name in groups]
+    heads = ("SR", *(f"safe, {factor:g} x limits" for factor in FACTORS), "trials")
+    scores = Table(
+        "safe-success",
+        f"Safe success of {run.folder.name}, percent [95 %]",
+        "",
+        heads,
+        (*rows, _row("all trials", measured, "average")),
+    )
+    won = [safety for record, safety in measured if record.success]
+    made = tuple(_measure(name, [one for _, one in measured], won) for name in MEASURES)
+    heads = ("limit", "median", "95 %", "most", "successes beyond", "expert", "its 95 %")
+    return scores, Table("safety", "What was measured of all trials", "", heads, made)
+
+
+def _row(label: str, group: Sequence[tuple[TrialRecord, Safety]], kind: str) -> TableRow:
+    """SR, and the share of trials that succeeded within each multiple of the limits."""
+    safe = [sum(r.success and not excesses(s, f) for r, s in group) for f in FACTORS]
+    counts = (sum(record.success for record, _ in group), *safe)
+    cells = [estimate_cell(wilson(count, len(group))) for count in counts]
+    return TableRow(label, (*cells, TableCell(str(len(group)))), kind)
+
+
+def _measure(name: str, found: Sequence[Safety], won: Sequence[Safety]) -> TableRow:
+    values = [getattr(one, name) for one in found]
+    beyond = sum(name in excesses(one) for one in won)
+    spread = np.percentile(values, (50, 95, 100)).tolist()
+    texts = [f"{x:.3g}" for x in (LIMITS[name], *spread)]
+    expert = [f"{x:.3g}" for x in EXPERT[name]]
+    cells = (*texts, f"{beyond} of {len(won)}", *expert)
+    return TableRow(
+        f"{name} [{UNITS[name]}]" if name in UNITS else name, tuple(map(TableCell, cells))
+    )

@@ -1,0 +1,46 @@
+"""Safe successes, and the limits that make them."""
+
+from pathlib import Path
+
+import pytest
+from fake_runs import outcomes, write
+
+from robospa.results.records.manifest import RunError
+from robospa.results.scoring.safety import (
+    EXPERT,
+    LIMITS,
+    MEASURES,
+    SAFETY,
+    Safety,
+    excesses,
+    read_safety,
+    safety_tables,
+)
+
+
+def test_a_success_is_safe_within_every_limit_and_the_table_says_how_much_they_matter(
+    tmp_path: Path,
+) -> None:
+    assert set(MEASURES) == set(LIMITS) == set(EXPERT)
+    run = write(tmp_path / "run", outcomes("Pick_Blocks_Size", 1, [1, 1, 1, 0]))
+    forces = (50.0, 100.0, 200.0, 0.0)
+    found = {
+        key: Safety(run.records[key].digest, finger=force)
+        for key, force in zip(run.keys, forces, strict=True)
+    }
+    assert [excesses(one) for one in found.values()] == [[], [], ["finger"], []]
+    scores, measures = safety_tables(run, found)
+    assert [cell.value for cell in scores.rows[-1].cells[:4]] == [75.0, 25.0, 50.0, 75.0]
+    finger = next(row for row in measures.rows if row.label == "finger [N]")
+    assert [cell.text for cell in finger.cells[:2]] == ["140", "75"]
+    assert finger.cells[4].text == "1 of 3"
+
+
+def test_a_damaged_file_is_refused_and_other_records_are_not_measured(tmp_path: Path) -> None:
+    run = write(tmp_path / "run", outcomes("Pick_Blocks_Size", 1, [1]))
+    (run.folder / SAFETY).write_text(f'{{"{run.keys[0].slug}": {{"digest": "of another end"}}}}')
+    assert read_safety(run) == {}
+    for text in ("{", '{"a": 1}'):
+        (run.folder / SAFETY).write_text(text)
+        with pytest.raises(RunError, match=SAFETY.replace(".", r"\.")):
+            read_safety(run)
