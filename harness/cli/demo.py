@@ -23,6 +23,8 @@ from robospa.harness.cli.options import PROCESSES, TRIALS
 
 if TYPE_CHECKING:
     from robospa.harness.settings import Selection
+    from robospa.results.records.runs import Run
+    from robospa.trial import TrialKey
 
 START_SECONDS = 60.0
 SAMPLE = (
@@ -44,9 +46,9 @@ def demo(
     workers: Annotated[
         int, typer.Option(callback=PROCESSES, help="worker processes; 0 for one per core")
     ] = 0,
-    video: Annotated[
-        str, typer.Option(help="of the mistakes, as in `robospa eval`; the expert's are `first`")
-    ] = "failures",
+    films: Annotated[
+        int, typer.Option(help="mistakes to film, of different types, each beside the expert")
+    ] = 3,
 ) -> None:
     """See two policies evaluated over the wire: tables, and a report of both with films."""
     from robospa.harness.running.request import new_folder
@@ -60,12 +62,11 @@ def demo(
     names = parse_tasks(",".join(SAMPLE) if tasks == "sample" else tasks)
     parse_levels(levels)
     chosen = _select(names, levels, trials)
-    runs = {"mistakes": (["--arg", "kind=all"], video), "oracle": ([], "first")}
-    for policy, (options, films) in runs.items():
-        if video == "none":
-            films = video
-        _evaluate(policy, options, chosen, folder / policy, workers, films)
-    report = make_report([read_run(folder / policy) for policy in runs])
+    folders = {"mistakes": folder / "mistakes", "oracle": folder / "oracle"}
+    _evaluate("mistakes", ["--arg", "kind=all"], chosen, folders["mistakes"], workers)
+    _evaluate("oracle", [], chosen, folders["oracle"], workers)
+    _film([read_run(each) for each in folders.values()], films)
+    report = make_report([read_run(each) for each in folders.values()])
     page = write_report(report, folder / "report") / "report.html"
     print(f"\nDone in {time.monotonic() - started:.0f} s. Open {page} in a browser.")
 
@@ -82,13 +83,32 @@ def _select(names: Sequence[str], levels: str, trials: int) -> Selection:
     return shipped
 
 
+def _film(runs: Sequence[Run], most: int) -> None:
+    """Film `most` failures of the first of `runs`, each of another type, and what the others did
+    in the same scenes."""
+    from robospa.harness.progress import Progress
+    from robospa.harness.running.films import Films, finish_films, replay_config
+    from robospa.results.failures.labels import label
+
+    kinds: dict[str, TrialKey] = {}
+    for key, record in sorted(runs[0].records.items()):
+        if failure := label(record):
+            kinds.setdefault(failure.kind, key)
+    keys = list(kinds.values())[:most]
+    for run in runs:
+        films = Films(replay_config(run), nice=0)
+        films.add(run.records[key] for key in keys)
+        for line in finish_films(films, Progress(len(run.keys), len(run.keys))):
+            print(line)
+
+
 def _evaluate(
-    policy: str, options: list[str], chosen: Selection, folder: Path, workers: int, video: str
+    policy: str, options: list[str], chosen: Selection, folder: Path, workers: int
 ) -> None:
     """Serve `policy`, evaluate it over the wire, print its table."""
     from robospa.harness.cli.eval import run_and_show
     from robospa.harness.running.request import make_request
-    from robospa.harness.settings import Compute, Connection, EvaluationSettings, Recording
+    from robospa.harness.settings import Compute, Connection, EvaluationSettings, Simulation
 
     with server(policy, *options) as url:
         print(f"\n`robospa serve {policy}` listens at {url}; it is evaluated:", flush=True)
@@ -96,9 +116,9 @@ def _evaluate(
             policy=(url,),
             out=folder,
             selection=chosen,
+            simulation=Simulation(run_seed="demo"),  # the same mistakes for everybody
             connection=Connection(timeout=60.0, first_timeout=60.0, wait=10.0, patience=10.0),
             compute=Compute(workers=workers),
-            recording=Recording(video=video),
         )
         run_and_show(make_request(settings, arguments={"command": "demo"}))
 
