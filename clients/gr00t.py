@@ -123,13 +123,8 @@ def _greeted(params: ConnectionParams) -> None:
     """Raises OSError where nobody listens, ConnectFailed for something that is not ZeroMQ."""
     endpoint, seconds = params.endpoint, params.timeouts.connect
     with socket.create_connection((endpoint.host, endpoint.port), seconds) as probe:
-        said = b""
         try:
-            while len(said) < len(GREETING):
-                piece = probe.recv(len(GREETING) - len(said))
-                if not piece:
-                    break
-                said += piece
+            said = probe.recv(len(GREETING))
         except TimeoutError:
             said = b""
     if said[:1] + said[9:] != GREETING[:1] + GREETING[9:]:

@@ -17,8 +17,8 @@ has these names, or others in `NAMES`, the first of which wins:
 Names of the space that was not asked for are ignored, as by RoboTwin's client of it; any other name
 is refused, because what it holds would be lost. An arm or a gripper that an action does not name
 stays as it was commanded last. Every message has
-an id, which its answer must repeat. A message that the server cannot read is never answered: then
-the deadline is the only news.
+an id, which its answer must repeat. Failures and unknown types are answered, a message that cannot
+be decoded is not: then the deadline is the only news.
 """
 
 import contextlib
@@ -43,7 +43,7 @@ from robospa.clients.dialect import ConnectionParams, Dialect, Probe, StatelessS
 from robospa.clients.numpy_msgpack import MsgpackSocket, binary_form
 from robospa.geometry import quaternion_to_matrix
 from robospa.observation import Observation
-from robospa.protocol.errors import PolicyAnswerError, ServerError, printable
+from robospa.protocol.errors import HandshakeError, PolicyAnswerError, ServerError, printable
 from robospa.protocol.options import option
 from robospa.protocol.policy import TrialInfo
 from robospa.registry import did_you_mean
@@ -155,6 +155,8 @@ CAMERAS = {"head": "cam_head", "left_wrist": "cam_left_wrist", "right_wrist": "c
 TCP_AHEAD = 0.12
 """The tool centre point is this far [m] along the x axis of the end-effector frame."""
 
+UNKNOWN_TYPE = "unknown_message_type"
+"""Code of an error that means another version of the protocol."""
 KNOWN = {"actions", "latency_ms", "ok", "result", "action_type"}
 """What an answer may have: the actions, and remarks about them."""
 
@@ -309,6 +311,11 @@ class XPolicyLabSession(StatelessSession):
             raise self._socket.violation(f"answer {answer.get('message_id')!r} came to {name!r}")
         if answer["message_type"] == "error":
             text = str(body.get("message", "no reason given"))
+            if str(body.get("code")).lower() == UNKNOWN_TYPE:
+                raise HandshakeError(
+                    f"{self._socket.url} runs another version of XPolicyLab, which does not know "
+                    f"{kind} ({printable(text, NAMED)}): update it"
+                )
             raise ServerError(str(body.get("code", "an error")), text, True, self._socket.url)
         if answer["message_type"] != expected:
             raise self._socket.violation(

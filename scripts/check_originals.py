@@ -4,8 +4,8 @@
 
 PYTHON has openpi-client, vla-eval, fastapi, uvicorn, json_numpy, msgpack-numpy, requests, scipy,
 opencv-python-headless, einops, tqdm. CHECKOUTS is a folder with openpi, AgiBot-World, X-VLA,
-XPolicyLab, RoboTwin (the parent of its commit 85c7f84), RoboTwin-main, starVLA, lingbot-vla and
-vllm-omni (a wheel unpacked). In every case the
+XPolicyLab, RoboTwin (the parent of its commit 85c7f84), RoboTwin-main, starVLA, lingbot-vla,
+openvla-oft (needs tensorflow), gr00t-n17, gr00t-n15, vllm-omni (its wheel). In every case the
 original server runs its own code with a model that reports what it reads; it is asked by the
 original client and by ours, with the same observations. Prints the table of docs/clients.md, and
 ends with 1 if an action differs. Not part of the tests, because it needs all that.
@@ -113,6 +113,26 @@ CASES = {
         "go1+http",
         "?wrists=swapped",
     ),
+    **{
+        f"gr00t-{way}": Case(f"GR00T: {title}", "gr00t.py", folder, "gr00t", words=(way,))
+        for way, folder, title in (
+            ("nested", "gr00t-n17", "`PolicyServer`, `Gr00tPolicy`'s checks; `PolicyClient`"),
+            ("nd", "gr00t-n17", "the same, arrays in msgpack-numpy's form"),
+            ("flat", "gr00t-n17", "the same behind its simulation wrapper"),
+            ("n15", "gr00t-n15", "N1.5's `RobotInferenceServer` and its client"),
+        )
+    },
+    **{
+        f"oft-{way}": Case(
+            f"OpenVLA-OFT: `deploy.py`; its ALOHA client (`actions={way}`)",
+            "oft.py",
+            "openvla-oft",
+            "oft+http",
+            f"?actions={way}",
+            words=(way,),
+        )
+        for way in ("absolute", "relative")
+    },
     "xvla": Case(
         "X-VLA: its FastAPI server; its RoboTwin client",
         "xvla.py",

@@ -375,6 +375,14 @@ def test_xpolicylab_an_error_leaves_the_connection_good() -> None:
         assert policy.infer(observation()).shape == (1, 14)
 
 
+def test_xpolicylab_of_another_version_stops_the_run() -> None:
+    says = {"code": "unknown_message_type", "message": "unsupported request type: infer"}
+    server = XPolicyLab()
+    server.extra = {"error": says}
+    with talking(server) as policy, pytest.raises(HandshakeError, match="another version"):
+        policy.infer(observation())
+
+
 @pytest.mark.parametrize(
     ("frame", "reason"),
     [

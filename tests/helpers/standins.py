@@ -376,6 +376,8 @@ class XPolicyLab(Socket):
                 continue
             try:
                 payload = self.payload(kind, seen["payload"])
+                wanted = "error" if "error" in payload else wanted
+                payload = payload.get("error", payload)
             except Exception as error:
                 wanted = "error"
                 payload = {"code": "INFER_FAILED", "message": str(error), "details": {}}
