@@ -112,8 +112,11 @@ class Served(ir.PolicyBase):
     def __init__(self, at: str) -> None:
         self._policy = open_policy(at, {})
         self._spec = spec = self._policy.spec
-        if spec.action != "joint" or spec.history or spec.sees_state:
-            raise ConfigError(f"{spec.name} wants more than pictures, joints and joint actions")
+        more = spec.history or spec.sees_state or spec.state == "measured"
+        if more or spec.action != "joint":
+            raise ConfigError(
+                f"{spec.name} wants more than pictures, joints as commanded and joint actions"
+            )
         cameras = tuple(ir.CameraSpec(one.name, one.height, one.width) for one in spec.cameras)
         meaning = ir.ActionSemantics("joint_pos", gripper="continuous")
         box = ir.Box((spec.action_dim or 14,), semantics=meaning)
@@ -138,16 +141,12 @@ class Served(ir.PolicyBase):
         key = _key_of(scene, self._robot)
         shown = key if self._spec.needs_trial_key else None
         left, right = (len(arm.joints) for arm in robot_named(self._robot).arms)
-        trial = robospa.TrialInfo(
-            key.task,
-            self._robot,
-            scene.instruction,
-            policy_seed(key, 0),
-            id=scene.id,
-            key=shown,
-            joints=(left, right),
+        text, seed = scene.instruction, policy_seed(key, 0)
+        self._policy.reset(
+            robospa.TrialInfo(
+                key.task, self._robot, text, seed, scene.id, shown, joints=(left, right)
+            )
         )
-        self._policy.reset(trial)
 
     def act(self, observation: ir.Observation) -> ir.ActionChunk:
         """The actions that are executed before the next query."""
