@@ -21,13 +21,14 @@ from robospa.results.figures.charts import chance_levels
 from robospa.results.figures.draw import draw_profile
 from robospa.results.figures.series import COLOURS, FORMATS, GRID, INK, DrawnFigure, spread
 from robospa.results.paper.origin import origin_of
+from robospa.results.paper.tables import write_tables
 from robospa.results.records.action_problems import problem_data
 from robospa.results.records.manifest import departures
 from robospa.results.records.runs import Run
 from robospa.results.report.report import Report, draw_figures
 from robospa.results.report.run_card import about, ends, facts, headline
 from robospa.results.report.score_table import percent
-from robospa.results.report.tables import for_page, write_files
+from robospa.results.report.tables import for_page
 from robospa.results.report.trials import failure_counts, trial_rows
 from robospa.results.scoring.comparable import comparable
 from robospa.results.scoring.grounding import grounding_data, records_of
@@ -308,7 +309,8 @@ def write_report(report: Report, folder: Path) -> Path:
     drawings = draw_figures(report.runs, report.columns, folder / FIGURES, failures=report.failures)
     for number, found in enumerate(report.profiles, 1):
         drawings += draw_profile(found, folder / FIGURES, number)
-    write_files(report.tables, folder / TABLES_FOLDER)
+    if report.tables:  # the same for papers and programs
+        write_tables([t.table for t in report.tables], folder / TABLES_FOLDER, ("tex", "csv"))
     (folder / "report.md").write_text(markdown(report), encoding="utf-8")
     (folder / "report.json").write_text(json.dumps(to_data(report), indent=1) + "\n")
     (folder / "report.html").write_text(page(report, drawings, folder), encoding="utf-8")

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robospa.results.paper.columns import Column, idle_column
 from robospa.results.paper.result_tables import summary_table, task_table
-from robospa.results.paper.tables import basic_table, write_tables
+from robospa.results.paper.tables import basic_table
 from robospa.results.scoring.models import ModelResults, by_track, restricted
 from robospa.results.scoring.scores import Variant
 from robospa.results.tables import Table, TableRow, html_fragment
@@ -128,15 +127,12 @@ def for_page(tables: Sequence[ReportTable]) -> list[PageTable]:
     said: set[str] = set()
     for table in tables:
         new = tuple(note for note in table.table.notes if table.folded or note not in said)
-        paper_table = replace(table.table, notes=new, rows=tuple(map(_short, table.table.rows)))
         if not table.folded:
             said.update(new)
-        long = [note for note in paper_table.notes if len(note) > LONG]
-        short = replace(
-            paper_table, notes=tuple(note for note in paper_table.notes if note not in long)
-        )
-        html = Markup(html_fragment(short))
-        made.append(PageTable(paper_table.title, html, table.folded, long))
+        long, short = ([n for n in new if (len(n) > LONG) == is_long] for is_long in (True, False))
+        rows = tuple(map(_short, table.table.rows))
+        html = Markup(html_fragment(replace(table.table, notes=tuple(short), rows=rows)))
+        made.append(PageTable(table.table.title, html, table.folded, long))
     return made
 
 
@@ -144,12 +140,6 @@ def _short(row: TableRow) -> TableRow:
     """`row` with its intervals beside the values' text, which the page shows if asked."""
     cells = (c if c.low is None else replace(c, text=c.text.split(" [")[0]) for c in row.cells)
     return replace(row, cells=tuple(cells))
-
-
-def write_files(tables: Sequence[ReportTable], folder: Path) -> None:
-    """The same tables for papers and programs: LaTeX and CSV."""
-    if tables:
-        write_tables([t.table for t in tables], folder, ("tex", "csv"))
 
 
 AVERAGES = (
@@ -176,15 +166,10 @@ def method_notes(columns: Sequence[Column]) -> list[str]:
     printed = any(column.published for column, _ in cells)
     ci = columns[0].scores.ci
     if ci == "bootstrap":
-        return [AVERAGES, BOOTSTRAP, *([PRINTED] if printed else [])]
+        return [AVERAGES, BOOTSTRAP, *[PRINTED] * printed]
     rates = (
         f"95 % intervals are over trials on other seeds: {SINGLE[ci]} for the rate of one variant; "
         "for an average MOVER, which combines the intervals of the variants below it."
     )
     resampled = any(not column.published for column, _ in cells)
-    return [
-        AVERAGES,
-        rates,
-        *([PROGRESS] if resampled else []),
-        *([PRINTED] if printed else []),
-    ]
+    return [AVERAGES, rates, *[PROGRESS] * resampled, *[PRINTED] * printed]

@@ -222,10 +222,7 @@ def over_tasks(
     return replace(found, low=min(found.low, at_least.low), high=max(found.high, at_least.high))
 
 
-_RATES: dict[str, Callable[[int, int], Estimate]] = {
-    "wilson": wilson,
-    "exact": exact,
-}
+_RATES: dict[str, Callable[[int, int], Estimate]] = {"wilson": wilson, "exact": exact}
 
 
 def _cell(sample: Sample, method: str, seed: int) -> Estimate:

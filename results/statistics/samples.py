@@ -142,7 +142,8 @@ def draw(
     resamples: int = RESAMPLES,
 ) -> NDArray[np.float64]:
     """Resampled values of the weighted sum of independent `samples`, shape [resamples]."""
-    _check_weights(samples, weights)
+    if len(samples) != len(weights) or not samples:
+        raise ValueError("a weighted sum needs one weight for each of at least one sample")
     generator = np.random.default_rng(seed)
     drawn = np.full(resamples, sum(w * s.shift for s, w in zip(samples, weights, strict=True)))
     for first in range(0, len(samples), CHUNK):
@@ -207,8 +208,3 @@ def _values(sample: Sample, resamples: int, generator: np.random.Generator) -> N
     random = generator.integers(0, GRID, size=resamples, dtype=np.uint16)
     step = sample.scale / sample.trials
     return np.asarray(sample.shift + step * _deck(sample.counts).take(random), dtype=np.float64)
-
-
-def _check_weights(samples: Sequence[Sample], weights: Sequence[float]) -> None:
-    if len(samples) != len(weights) or not samples:
-        raise ValueError("a weighted sum needs one weight for each of at least one sample")

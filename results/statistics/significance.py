@@ -110,9 +110,7 @@ RateOrEstimate = Sample | Estimate | None
 """A cell of a table: outcomes of a variant, an average with its interval, or nothing."""
 
 
-def supported_best(
-    rows: Sequence[Sequence[RateOrEstimate]], alpha: float = ALPHA
-) -> list[frozenset[int]]:
+def supported_best(rows: Sequence[Sequence[RateOrEstimate]]) -> list[frozenset[int]]:
     """For each row of a table, the places of the entries that may be called its best.
 
     Nothing in the row is better than these, and they are better than something in it: an entry of
@@ -121,18 +119,17 @@ def supported_best(
     correction, so pass whole tables. Two success rates take Boschloo's test, anything else the
     interval of the difference of independent estimates. Entries that are None take no part.
     """
-    tests: list[tuple[int, int, int, float]] = []
+    tests: dict[tuple[int, int, int], float] = {}
     for number, row in enumerate(rows):
         known = [(place, entry) for place, entry in enumerate(row) if entry is not None]
         known.sort(key=lambda found: -found[1].value)
         for (high, first), (low, second) in combinations(known, 2):
-            tests.append((number, high, low, p_of_difference(first, second)))
+            tests[number, high, low] = p_of_difference(first, second)
     better: list[set[int]] = [set() for _ in rows]
     worse: list[set[int]] = [set() for _ in rows]
-    for (number, high, low, _), q in zip(
-        tests, benjamini_hochberg([p for *_, p in tests]), strict=True
-    ):
-        if q < alpha:
+    adjusted = benjamini_hochberg([*tests.values()])
+    for (number, high, low), q in zip(tests, adjusted, strict=True):
+        if q < ALPHA:
             better[number].add(high)
             worse[number].add(low)
     return [frozenset(one - other) for one, other in zip(better, worse, strict=True)]
