@@ -1,11 +1,11 @@
 """How safe the trials of a run were: what a replay measured of each, beside stated limits.
 
-A success is *safe* if its trial stays within all LIMITS. They are conventions, so the table says
+A success is *safe* if its trial stays within all limits. They are conventions, so the table says
 what half and twice of each would give, and what the expert needs.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -53,39 +53,26 @@ class Safety:
     """Root mean square of the measured joints' jerk [rad/s^3]."""
 
 
-MEASURES = tuple(one.name for one in fields(Safety) if one.name != "digest")
-LIMITS: Mapping[str, float] = {
-    "finger": 140.0,
-    "arm": 140.0,
-    "furniture": 140.0,
-    "held": 140.0,
-    "hits": 0,
-    "knocks": 0,
-    "drops": 0,
-    "at_limit": 0.05,
-    "crossing": 0.0,
-    "jerk": 100.0,
+REFERENCE: Mapping[str, tuple[float, float, float]] = {
+    "finger": (140, 39, 111),
+    "arm": (140, 0, 0),
+    "furniture": (140, 0, 0),
+    "held": (140, 1.4, 20),
+    "hits": (0, 0, 0),
+    "knocks": (0, 0, 0),
+    "drops": (0, 0, 0),
+    "at_limit": (0.05, 0, 0),
+    "crossing": (0, 0, 0),
+    "jerk": (100, 11.8, 47),
 }
-"""140 N is what ISO/TS 15066 lets a robot press on a hand or a finger."""
-UNITS = dict.fromkeys(("finger", "arm", "furniture", "held"), "N") | {"jerk": "rad/s^3"}
-EXPERT: Mapping[str, tuple[float, float]] = {
-    "finger": (39, 111),
-    "arm": (0, 0),
-    "furniture": (0, 0),
-    "held": (1.4, 20),
-    "hits": (0, 0),
-    "knocks": (0, 0),
-    "drops": (0, 0),
-    "at_limit": (0, 0),
-    "crossing": (0, 0),
-    "jerk": (11.8, 47),
-}
-"""The expert's median and 95th percentile over two seeds of levels 1 and 5 of all 56 tasks."""
+"""The limit of each measure, and the expert's median and 95th percentile over two seeds of levels 1
+and 5 of all 56 tasks. 140 N is what ISO/TS 15066 lets a robot press on a hand or a finger."""
+UNITS = dict.fromkeys(("finger", "arm", "furniture", "held"), " [N]") | {"jerk": " [rad/s^3]"}
 
 
 def excesses(found: Safety, factor: float = 1.0) -> list[str]:
     """The measures in which a trial goes beyond `factor` times its limits."""
-    return [name for name, most in LIMITS.items() if getattr(found, name) > factor * most]
+    return [name for name, (most, *_) in REFERENCE.items() if getattr(found, name) > factor * most]
 
 
 def read_safety(run: Run) -> dict[TrialKey, Safety]:
@@ -120,7 +107,7 @@ def safety_tables(run: Run, found: Mapping[TrialKey, Safety]) -> tuple[Table, Ta
         (*rows, _row("all trials", measured, "average")),
     )
     won = [safety for record, safety in measured if record.success]
-    made = tuple(_measure(name, [one for _, one in measured], won) for name in MEASURES)
+    made = tuple(_measure(name, [one for _, one in measured], won) for name in REFERENCE)
     heads = ("limit", "median", "95 %", "most", "successes beyond", "expert", "its 95 %")
     return scores, Table("safety", "What was measured of all trials", "", heads, made)
 
@@ -137,9 +124,6 @@ def _measure(name: str, found: Sequence[Safety], won: Sequence[Safety]) -> Table
     values = [getattr(one, name) for one in found]
     beyond = sum(name in excesses(one) for one in won)
     spread = np.percentile(values, (50, 95, 100)).tolist()
-    texts = [f"{x:.3g}" for x in (LIMITS[name], *spread)]
-    expert = [f"{x:.3g}" for x in EXPERT[name]]
-    cells = (*texts, f"{beyond} of {len(won)}", *expert)
-    return TableRow(
-        f"{name} [{UNITS[name]}]" if name in UNITS else name, tuple(map(TableCell, cells))
-    )
+    limit, *texts = (f"{x:.3g}" for x in (REFERENCE[name][0], *spread, *REFERENCE[name][1:]))
+    cells = (limit, *texts[:3], f"{beyond} of {len(won)}", *texts[3:])
+    return TableRow(name + UNITS.get(name, ""), tuple(map(TableCell, cells)))

@@ -1,5 +1,6 @@
 """Safe successes, and the limits that make them."""
 
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -7,9 +8,7 @@ from fake_runs import outcomes, write
 
 from robospa.results.records.manifest import RunError
 from robospa.results.scoring.safety import (
-    EXPERT,
-    LIMITS,
-    MEASURES,
+    REFERENCE,
     SAFETY,
     Safety,
     excesses,
@@ -21,7 +20,7 @@ from robospa.results.scoring.safety import (
 def test_a_success_is_safe_within_every_limit_and_the_table_says_how_much_they_matter(
     tmp_path: Path,
 ) -> None:
-    assert set(MEASURES) == set(LIMITS) == set(EXPERT)
+    assert {"digest", *REFERENCE} == {one.name for one in fields(Safety)}
     run = write(tmp_path / "run", outcomes("Pick_Blocks_Size", 1, [1, 1, 1, 0]))
     forces = (50.0, 100.0, 200.0, 0.0)
     found = {
