@@ -77,6 +77,6 @@ def paper(
 
 
 def _print_errata(walked: int, wrong: Sequence[Check]) -> None:
-    print(f"\n{walked} printed cells walked; {len(wrong)} do not follow from the others:")
+    print(f"\n{walked} printed cells checked; {len(wrong)} do not follow from the others:")
     for number, check in enumerate(wrong, 1):
         print(f"{number:3} {check}")

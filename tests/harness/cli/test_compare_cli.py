@@ -87,7 +87,7 @@ def test_all_tables_are_written_and_the_errata_told(tmp_path: Path) -> None:
     code, out, _ = robospa("paper", "--out", str(tmp_path / "paper"), "--no-figures")
     assert code == 0
     assert "Overall average" in out
-    assert "2747 printed cells walked; 22 do not follow" in out
+    assert "2747 printed cells checked; 22 do not follow" in out
     assert "main, RRR, X-VLA, Drop: printed 28.2, recomputed 26.2" in out
     names = {path.name for path in (tmp_path / "paper").iterdir()}
     assert {"tables.md", "tables.tex", "tables.html", "tables.csv", "main.tex"} <= names
