@@ -206,14 +206,6 @@ class Modality:
 def read_config(answer: object) -> dict[str, Modality]:
     """The server's configuration by modality; raises HandshakeError."""
     try:
-        if isinstance(answer, Mapping) and "action_keys" in answer:
-            # StarVLA's server on this wire: it reads every image, in the order that comes
-            named = {
-                m: [k.split(".", 1)[-1] for k in answer[f"{m}_keys"]] for m in ("state", "action")
-            }
-            named |= {"video": [NAMES[name][0] for name in CAMERAS]}
-            named |= {"language": ["annotation.human.task_description"]}
-            return {modality: Modality(tuple(keys)) for modality, keys in named.items()}
         found = {str(name): _modality(one) for name, one in dict(answer).items()}  # type: ignore[call-overload]
         return {"video": found["video"], "action": found["action"], **found}
     except (KeyError, TypeError, ValueError, AttributeError) as error:

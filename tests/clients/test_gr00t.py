@@ -133,19 +133,6 @@ def test_a_part_of_another_width_and_parts_of_unequal_length() -> None:
         answered(server)
 
 
-def test_starvlas_server_on_this_wire_names_its_keys_flat() -> None:
-    class StarVla(Gr00t):
-        def answer(self, seen: Any) -> Any:
-            if seen["endpoint"] == "get_modality_config":
-                keys = [f"{{}}.{name}" for name in self.config["state"]["modality_keys"]]
-                return {f"{m}_keys": [k.format(m) for k in keys] for m in ("state", "action")}
-            return super().answer(seen)
-
-    server = StarVla()
-    server.config["video"]["modality_keys"] = ["head", "left_wrist", "right_wrist"]
-    assert list(first_request(server)["video"]) == ["head", "left_wrist", "right_wrist"]
-
-
 def test_a_token_and_a_wrong_one() -> None:
     server = Gr00t()
     server.token = "open sesame"
