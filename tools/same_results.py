@@ -157,6 +157,8 @@ def write_trials(folder: Path) -> None:
         records = [json.loads(line) for path in out.rglob("*.jsonl") for line in path.open()]
         have = {str(r["key"]) for r in records if r["end"] != "infrastructure"}
         kept = [r for r in records if r["end"] != "infrastructure" or str(r["key"]) not in have]
+        if not kept:
+            raise SystemExit(f"{name}: no trial was run")
         (folder / f"trials-{name}.txt").write_text("".join(sorted(map(_stripped, kept))))
 
 
