@@ -136,7 +136,8 @@ class Animation(FilmRecorder):
         every: int = 1,
         size: tuple[int, int] = DRAWN,
     ) -> None:
-        super().__init__((CAMERA,), size)
+        super().__init__((CAMERA,))
+        self._cameras = [CameraSpec(CAMERA, *size)]
         self._page, self._every, self._count = drawn, every, 0
         self.frames: list[Image.Image] = []
 
