@@ -24,7 +24,6 @@ EXTRAS = {
     "trimesh": "assets",
     "torch": "learn",
     "gymnasium": "gym",
-    "pygame": "gym",
     "wandb": "wandb",
     "openai": "agent",
     "viser": "view",

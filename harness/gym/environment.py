@@ -25,7 +25,6 @@ from robospa.harness.robots.kinematics import chain_of
 from robospa.harness.seeds.lists import find_list
 from robospa.harness.settings import SettingsError
 from robospa.harness.trial import (
-    Recorder,
     TrialState,
     open_trial,
     policy_seed,
@@ -46,8 +45,6 @@ from robospa.tasks.seeds import ListKey
 from robospa.trial import REFERENCE, TrialKey
 
 USUAL_CAMERAS = tuple(camera.name for camera in DEFAULT_CAMERAS)
-FRAME_SECONDS = 0.1
-"""Simulated seconds between two pictures in a window."""
 Observation = dict[str, Any]
 Info = dict[str, Any]
 
@@ -65,7 +62,7 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     `render_size` are what `render` shows.
     """
 
-    metadata = {"render_modes": ["rgb_array", "human"], "render_fps": 10}  # noqa: RUF012
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012
 
     def __init__(
         self,
@@ -92,8 +89,8 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         found = find_task(task)
         if level not in found.levels:
             raise SettingsError(f"{found.name} has levels {sorted(found.levels)}, not {level}")
-        if render_mode not in (None, "rgb_array", "human"):
-            raise SettingsError(f"render_mode {render_mode!r} is not one of rgb_array and human")
+        if render_mode not in (None, "rgb_array"):
+            raise SettingsError(f"render_mode {render_mode!r} is not rgb_array or None")
         if wrong := [name for name in (*cameras, render_camera) if name not in CAMERAS]:
             raise SettingsError(f"there is no camera {wrong[0]!r}; known are {', '.join(CAMERAS)}")
         self.spec_of_policy = spec or PolicySpec(
@@ -117,7 +114,6 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._camera = CameraSpec(render_camera, *render_size)
         # What simulates is opened at the first reset: a vector's parent only looks at the spaces.
         self._world: World | None = None
-        self._window: Window | None = None
         self._trial: TrialState | None = None
         self._record: TrialRecord | None = None
         self._told = 0
@@ -135,8 +131,7 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._record = None
         self._told = 0
         setup = self._parts(self._key)
-        watcher = _Watcher(self) if self.render_mode == "human" else None
-        self._trial = open_trial(self._opened(), self._key, setup, watcher)
+        self._trial = open_trial(self._opened(), self._key, setup)
         if self._trial.start():
             self._finish(self._trial.end, "the goal was decided before the first action")
         return self._observation(), {**self._info(), **self._about()}
@@ -170,12 +165,8 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._observation(), float(success), terminated, truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """The picture of this instant, uint8 (height, width, 3), for "rgb_array"; for "human" the
-        window is drawn whenever something happens, and this draws it once more."""
+        """The picture of this instant, uint8 (height, width, 3); None without "rgb_array"."""
         if self.render_mode is None or self._trial is None:
-            return None
-        if self.render_mode == "human":
-            self._draw_window()
             return None
         return self._opened().render(self._camera)
 
@@ -183,9 +174,6 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if self._world is not None:
             self._world.close()
             self._world = None
-        if self._window is not None:
-            self._window.close()
-            self._window = None
         self._trial = None
 
     @property
@@ -261,11 +249,6 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def _about(self) -> Info:
         return {**asdict(self._key), "instruction": self.instruction}
 
-    def _draw_window(self) -> None:
-        if self._window is None:
-            self._window = Window(self._key.task, self._camera.width, self._camera.height)
-        self._window.show(self._opened().render(self._camera))
-
 
 def space_of(name: str, value: Any) -> Any:
     """An entry of an observation as its space has it: copies, because the world keeps its own."""
@@ -274,40 +257,6 @@ def space_of(name: str, value: Any) -> Any:
     if name == "step":
         return np.int64(value)
     return value if isinstance(value, str) else np.array(value, dtype=np.float32)
-
-
-class _Watcher(Recorder):
-    """Draws the window while actions are executed."""
-
-    def __init__(self, env: TaskEnv) -> None:
-        self._env, self._next = env, 0.0
-
-    def started(self, world: World) -> None:
-        self._env.render()
-
-    def polled(self, world: World, time: float) -> None:
-        if time >= self._next:
-            self._next = time + FRAME_SECONDS
-            self._env.render()
-
-
-class Window:
-    """`width` x `height` pixels; raises MissingPackage without pygame, of the extra `gym`."""
-
-    def __init__(self, title: str, width: int, height: int) -> None:
-        self._pygame = need("pygame")
-        self._pygame.display.init()
-        self._pygame.display.set_caption(title)
-        self._surface = self._pygame.display.set_mode((width, height))
-
-    def show(self, image: NDArray[np.uint8]) -> None:
-        """Show an RGB image, uint8 (height, width, 3)."""
-        self._pygame.surfarray.blit_array(self._surface, image.swapaxes(0, 1))
-        self._pygame.display.flip()
-        self._pygame.event.pump()  # else the desktop calls the program dead
-
-    def close(self) -> None:
-        self._pygame.display.quit()
 
 
 NAMESPACE = "RoboSPA"
