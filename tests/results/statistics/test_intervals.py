@@ -118,11 +118,6 @@ def test_limits_of_a_paired_difference_are_where_the_score_reaches_two(
         assert abs(score) == pytest.approx(1.96, abs=0.005)
 
 
-def test_a_paired_difference_excludes_zero_where_mcnemars_score_does() -> None:
-    assert paired_difference(20, 8, 100).low > 0  # 12 / sqrt(28) = 2.27
-    assert paired_difference(17, 9, 100).low < 0  # 8 / sqrt(26) = 1.57
-
-
 def test_impossible_pairs_are_refused() -> None:
     with pytest.raises(ValueError, match="3 and 3 discordant of 4 pairs cannot be"):
         paired_difference(3, 3, 4)
@@ -392,13 +387,9 @@ def test_mcnemar_by_hand() -> None:
         mcnemar_mid_p(-1, 2)
 
 
-def test_boschloo_of_two_trials_by_hand() -> None:
-    # Only 0 of 1 against 1 of 1 is as extreme: (1 - p) p is at most 1/4, and both sides double it.
-    assert boschloo(rate(0, 1), rate(1, 1)) == pytest.approx(0.5)
-    assert boschloo(rate(3, 10), rate(3, 10)) == 1.0
-
-
-@pytest.mark.parametrize("table", [(20, 33, 100, 100), (0, 5, 100, 100), (9, 3, 30, 12)])
+@pytest.mark.parametrize(
+    "table", [(20, 33, 100, 100), (0, 1, 1, 1), (3, 3, 10, 10), (9, 3, 30, 12)]
+)
 def test_boschloo_agrees_with_scipy(table: tuple[int, int, int, int]) -> None:
     from scipy.stats import boschloo_exact
 

@@ -6,7 +6,7 @@ import pytest
 from snapshots_by_hand import AWAY, TICK, held, kinds, play, snap
 
 from robospa.geometry import Pose, Vec3
-from robospa.tasks.events import Event, outcome
+from robospa.tasks.events import outcome
 from robospa.tasks.goals import counters, memory
 from robospa.tasks.goals.checklist import CHAIN, Checklist, by_turns
 from robospa.tasks.goals.clicks import ClickInOrder, PressCounts
@@ -256,28 +256,11 @@ def test_every_part_has_its_pairs() -> None:
     assert [roles[name].subtasks for name in "abc"] == [(1,), (1, 2), (2,)]
 
 
-# Towers
+# Towers and vessels
 
 H = 0.036
 GROUND: Places = {"a": (0.0, -0.13, 0.758), "b": (0.2, 0.0, 0.758), "c": (-0.2, 0.0, 0.758)}
-
-
-def tower(*names: str, shift: Vec3 = (0.0, 0.0, 0.0)) -> Places:
-    """`GROUND` with `names` above each other, the last one out of place by `shift`."""
-    result = dict(GROUND)
-    for i, name in enumerate(names):
-        result[name] = (0.0, -0.13, 0.758 + i * H)
-    x, y, z = result[names[-1]]
-    result[names[-1]] = (x + shift[0], y + shift[1], z + shift[2])
-    return result
-
-
-def stacked(order: str = "abc") -> Checklist:
-    return stack(order, [H] * len(order))
-
-
-# Vessels
-
+TOWER: Places = {name: (0.0, -0.13, 0.758 + i * H) for i, name in enumerate("abc")}
 BOWLS: Places = {
     "p": (0.1, -0.12, 0.74),
     "a": (0.2, 0.1, 0.74),
@@ -286,15 +269,9 @@ BOWLS: Places = {
 }
 
 
-def nested(*names: str, shift: Vec3 = (0.0, 0.0, 0.0), **other: Vec3) -> Places:
-    """`BOWLS` with `names` nested on the plate, the last one out of place by `shift`."""
-    found = dict(BOWLS)
-    for i, name in enumerate(names):
-        found[name] = (0.1, -0.12, 0.745 + 0.02 * i)
-    if names:
-        x, y, z = found[names[-1]]
-        found[names[-1]] = (x + shift[0], y + shift[1], z + shift[2])
-    return found | other
+def nested(*names: str) -> Places:
+    """`BOWLS` with `names` nested on the plate."""
+    return BOWLS | {name: (0.1, -0.12, 0.745 + 0.02 * i) for i, name in enumerate(names)}
 
 
 def test_bowls_count_after_release_and_success_waits_for_open_grippers() -> None:
@@ -303,7 +280,7 @@ def test_bowls_count_after_release_and_success_waits_for_open_grippers() -> None
     assert outcome(play(nest("abc", "p"), BOWLS, holding, nested("a")), 3).done == 1
     for make, start, scene in (
         (lambda: nest("abc", "p"), BOWLS, nested("a", "b", "c")),
-        (stacked, GROUND, tower("a", "b", "c")),
+        (lambda: stack("abc", [H] * 3), GROUND, TOWER),
     ):
         closed = snap(0, scene, (1.0, 0.5))
         assert "success" not in kinds(play(make(), start, closed))
@@ -317,23 +294,19 @@ PLACES: dict[str, Vec3] = {"a": (-0.2, 0.0, 0.74), "b": (-0.1, 0.0, 0.74), "c": 
 TOP = Pose((0.0, 0.0, 0.04))
 
 
-def counter(name: str, closed: bool = True) -> PressCounter:
-    return PressCounter(name, TOP, arm=0 if closed else None)
-
-
-def touching(names: str, opening: float = 0.0, instants: int = 3) -> list[Snapshot]:
+def touching(names: str, opening: float = 0.0) -> list[Snapshot]:
     """A touch of each named object in turn, each followed by 0.2 s without one."""
     made = [snap(0, PLACES)]
     for name in names:
         x, y, z = PLACES[name]
         contact = [(name, (x, y, z + 0.04))]
-        made += [snap(0, PLACES, (opening, 1.0), AWAY, contact)] * instants
+        made += [snap(0, PLACES, (opening, 1.0), AWAY, contact)] * 3
         made += [snap(0, PLACES, (opening, 1.0))] * 10
     return made
 
 
 def test_diagnostics_count_what_went_wrong() -> None:
-    tracker = ClickInOrder([counter("a"), counter("b")])
+    tracker = ClickInOrder([PressCounter(n, TOP, arm=0) for n in "ab"])
     play(tracker, *touching("baa"))
     found = tracker.diagnostics()
     assert (found["out_of_order"], found["repeated_clicks"], found["presses"]) == (1, 1, 3)
@@ -342,18 +315,13 @@ def test_diagnostics_count_what_went_wrong() -> None:
 # Counts
 
 
-def press(times: tuple[int, ...], touched: str) -> tuple[PressCounts, list[Event]]:
-    tracker = PressCounts([counter(n, closed=False) for n in "ab"], times)
-    return tracker, play(tracker, *touching(touched, opening=1.0))
-
-
 @pytest.mark.parametrize(
     ("touched", "done", "out_of_order", "excess"),
     [("aab", 2, 0, 0), ("baa", 2, 1, 0), ("aba", 2, 1, 0), ("ab", 1, 1, 0), ("aaaba", 1, 1, 2)],
 )
 def test_exact_counts_in_any_order(touched: str, done: int, out_of_order: int, excess: int) -> None:
-    tracker, events = press((2, 1), touched)
-    result = outcome(events, 2)
+    tracker = PressCounts([PressCounter(n, TOP) for n in "ab"], (2, 1))
+    result = outcome(play(tracker, *touching(touched, opening=1.0)), 2)
     assert (result.success, result.failed, result.done) == (done == 2, False, done)
     found = tracker.diagnostics()
     assert (found["out_of_order"], found["excess_presses"]) == (out_of_order, excess)
@@ -367,14 +335,6 @@ SHOWN: dict[str, Vec3] = {"a": (-0.1, 0.0, 0.755), "b": (0.1, 0.0, 0.755), "x": 
 WALL: dict[str, Vec3] = {"wall": (0.0, 0.12, 0.945)}
 NEAR_PLACING: dict[str, Vec3] = {"a": (-0.1, -0.18, 0.755), "b": (0.1, -0.18, 0.755)}
 DONE, UNDONE = "subtask_done", "subtask_undone"
-
-
-def gathered(
-    *after: Snapshot, before: tuple[Snapshot, ...] = ()
-) -> tuple[memory.AfterCue, list[Event]]:
-    """Two blocks to bring and one to leave; `after` the wall has come."""
-    goal = memory.AfterCue(gather(["a", "b"], ["x"], STRIP), ["wall"])
-    return goal, play(goal, SHOWN, *before, {**SHOWN, **WALL}, *after)
 
 
 def there(*names: str, z: float = 0.755, gripper: float = 1.0, **elsewhere: Vec3) -> Snapshot:
@@ -396,6 +356,7 @@ def there(*names: str, z: float = 0.755, gripper: float = 1.0, **elsewhere: Vec3
     ],
 )
 def test_shown_blocks_in_the_strip(steps: list[Snapshot], found: list[str]) -> None:
-    goal, events = gathered(*steps)
-    assert kinds(events) == ["cue_hidden", *found]
+    """Two blocks to bring and one to leave, after the wall has come."""
+    goal = memory.AfterCue(gather(["a", "b"], ["x"], STRIP), ["wall"])
+    assert kinds(play(goal, SHOWN, {**SHOWN, **WALL}, *steps)) == ["cue_hidden", *found]
     assert goal.diagnostics()["cue_hidden_at"] == TICK
