@@ -236,7 +236,7 @@ def _verify(out: Path, replays: int, as_json: bool) -> None:
             print(f"{folder}: {line}")
         for line in verdict.problems:
             print(f"robospa: {line}", file=sys.stderr)
-    sound = all(verdict.sound for verdict in verdicts.values())
+    sound = not any(verdict.problems for verdict in verdicts.values())
     if as_json:
         print_json({"sound": sound, "folders": verdicts})
     if not sound:

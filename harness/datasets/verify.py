@@ -50,11 +50,6 @@ class Verification:
     problems: tuple[str, ...]
     checked: tuple[str, ...]
 
-    @property
-    def sound(self) -> bool:
-        """True if nothing is wrong."""
-        return not self.problems
-
 
 def verify(
     folder: Path,

@@ -13,45 +13,44 @@ import io
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, redirect_stdout
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, cast
-
-from robospa.extras import need
-from robospa.geometry import Pose
-from robospa.harness.replay import replay_record
-from robospa.harness.trial import Recorder, TrialSetup, run_trial, task_parts
-from robospa.harness.world import World
-from robospa.protocol.policy import Policy
-from robospa.results.records.manifest import RunError
-from robospa.results.records.runs import Run, finished, read_run
-from robospa.results.records.trial_record import TrialRecord
-from robospa.tasks.descriptions import describe_objects
-from robospa.trial import TrialKey
-
-if TYPE_CHECKING:
-    import viser
-
-from bisect import bisect_right
-from collections.abc import Iterable
-from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import ARMS
-from robospa.geometry import to_matrix
+from robospa.extras import need
+from robospa.geometry import Pose, to_matrix
+from robospa.harness.factory import load_function
+from robospa.harness.replay import replay_record
+from robospa.harness.robots import embodiment
 from robospa.harness.robots.embodiment import Embodiment
-from robospa.harness.sim.render_bodies import surface
+from robospa.harness.sim.render_bodies import surface, tinted
+from robospa.harness.trial import Recorder, TrialSetup, run_trial, task_parts
+from robospa.harness.world import World
+from robospa.protocol.policy import Policy
 from robospa.results.failures.labels import NAMES, label
 from robospa.results.records.action_problems import with_names
-from robospa.results.records.trial_record import EventRow
+from robospa.results.records.manifest import RunError
+from robospa.results.records.runs import Run, finished, read_run
+from robospa.results.records.trial_record import EventRow, TrialRecord
 from robospa.results.report.run_card import END_NAMES
+from robospa.tasks.descriptions import describe_objects
 from robospa.tasks.objects import object_model
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Color, Shape, Skin
+from robospa.trial import TrialKey
+
+if TYPE_CHECKING:
+    import viser
+
+    from robospa.harness.sim.sapien_world import SapienWorld
 
 UNLISTED = frozenset({"approached"})
 """Kinds of events that are too many to be a list: a gripper came near something."""
@@ -258,8 +257,6 @@ def _merged(shapes: Sequence[Shape], color: Color) -> DrawnMesh:
 
 def _skinned(skin: Skin) -> DrawnMesh:
     """The mesh in the file of `skin`, with its picture's colours at its vertices."""
-    from robospa.harness.sim.render_bodies import tinted
-
     with np.load(skin.file, allow_pickle=False) as file:
         vertices, faces, uvs = file["vertices"], file["triangles"], file["uvs"]
         picture = tinted(file["picture"], skin)
@@ -274,16 +271,8 @@ EVERY = 0.1
 """Simulated seconds between two frames."""
 
 
-class HasBodies(Protocol):
-    """A world that tells where its bodies are."""
-
-    def bodies(self) -> Mapping[str, Pose]:
-        """World pose of everything that moves, by name."""
-        ...
-
-
 class PoseRecorder(Recorder):
-    """A `Recorder` of where everything is, ten times a simulated second."""
+    """A `Recorder` of where everything in our simulator is, ten times a simulated second."""
 
     def __init__(self) -> None:
         self.times: list[float] = []
@@ -300,10 +289,8 @@ class PoseRecorder(Recorder):
         self._keep(world, world.snapshot().time)
 
     def _keep(self, world: World, time: float) -> None:
-        if not hasattr(world, "bodies"):
-            raise TypeError(f"{type(world).__name__} does not tell where its bodies are")
         self.times.append(time)
-        self.frames.append(cast(HasBodies, world).bodies())
+        self.frames.append(cast("SapienWorld", world).bodies())
 
 
 def recorded_playback(
@@ -360,8 +347,6 @@ def trial_named(run: Run, name: str) -> TrialRecord:
 
 def of_run(folder: Path, name: str) -> tuple[Playback, list[DrawnBody]]:
     """The trial called `name` of the run in `folder`, replayed; raises RunError, ReplayError."""
-    from robospa.harness.factory import load_function
-    from robospa.harness.robots import embodiment
     from robospa.harness.running.films import replay_config
     from robospa.harness.sim.sapien_world import SapienWorld
 
@@ -377,7 +362,6 @@ def of_run(folder: Path, name: str) -> tuple[Playback, list[DrawnBody]]:
 def of_expert(key: TrialKey) -> tuple[Playback, list[DrawnBody]]:
     """The trial `key` with the expert; passes on what its world raises."""
     from robospa.harness.factory import policy_factory
-    from robospa.harness.robots import embodiment
     from robospa.harness.seeds.attempt import ORACLE
     from robospa.harness.sim.sapien_world import SapienWorld
 

@@ -181,7 +181,7 @@ def test_a_sound_data_set_of_every_format(layout: str, tmp_path: Path) -> None:
     episodes = tiny_dataset(tmp_path, layout, FORMATS[layout].images[0], count=4)
     simulator = Replayed(episodes)
     verdict = verify(tmp_path, 3, simulator)
-    assert verdict.problems == () and verdict.sound
+    assert verdict.problems == ()
     assert len(simulator.seen) == 3 and len(verdict.checked) == 3
     assert "3 of 4 episodes" in verdict.checked[2]
     assert verify(tmp_path, 0).checked[2] == "No episode was replayed."

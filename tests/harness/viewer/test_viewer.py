@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -134,12 +135,6 @@ def test_a_trial_that_does_not_come_again_is_refused(tmp_path: Path) -> None:
             recorded_playback(Posed(), claim, tmp_path / "run", parts=parts)
 
 
-def test_a_world_that_does_not_tell_where_its_bodies_are_is_refused(tmp_path: Path) -> None:
-    record = recorded(tmp_path / "run", KEYS[0])
-    with pytest.raises(TypeError, match="FakeWorld does not tell"):
-        recorded_playback(FakeWorld(), record, tmp_path / "run", parts=parts)
-
-
 @pytest.mark.sim
 def test_the_simulator_tells_where_links_objects_and_doors_are() -> None:
     from robospa.harness.sim.sapien_world import SapienWorld
@@ -225,26 +220,15 @@ BODIES = [
 ]
 
 
-class Node:
-    """A thing in a scene that only remembers what was set."""
-
-    def __init__(self, name: str, **given: Any) -> None:
-        self.name, self.visible, self.given = name, True, given
-        self.position: tuple[float, ...] = (0.0, 0.0, 0.0)
-        self.wxyz: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
-
-
 class FakeScene:
     """Stands for viser's scene."""
 
     def __init__(self) -> None:
-        self.nodes: dict[str, Node] = {}
+        self.nodes: dict[str, SimpleNamespace] = {}
 
-    def __getattr__(self, name: str) -> Callable[..., Node]:
-        def add(path: str = "", *more: Any, **given: Any) -> Node:
-            node = Node(path, more=more, **given)
-            if name.startswith("add_"):
-                self.nodes[path] = node
+    def __getattr__(self, name: str) -> Callable[..., SimpleNamespace]:
+        def add(path: str = "", *more: Any, **given: Any) -> SimpleNamespace:
+            self.nodes[path] = node = SimpleNamespace(visible=True, more=more, **given)
             return node
 
         return add
@@ -254,9 +238,9 @@ def test_bodies_move_names_stand_above_them_and_wanted_ones_are_marked() -> None
     fake = FakeScene()
     scene = Scene3D(fake, played(), BODIES)
     assert fake.nodes["/0"].position == (0.0, 0.0, 0.7)
-    assert fake.nodes["/1/name"].given["more"] == ("the red block",)
+    assert fake.nodes["/1/name"].more == ("the red block",)
     assert "/0/name" not in fake.nodes
-    assert fake.nodes["/1/name"].given["position"][2] > 0.2
+    assert fake.nodes["/1/name"].position[2] > 0.2
     assert scene.show(0.1) == 2
     assert fake.nodes["/1"].position == (0.0, 0.0, 0.1)
     assert not fake.nodes["/1/wanted"].visible, "its subtask is done"
