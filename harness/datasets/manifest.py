@@ -28,7 +28,6 @@ FORMAT = 1
 """Version of these files; another is refused."""
 MANIFEST, SUMS = "robospa.json", "SHA256SUMS"
 EPISODES, EVENTS = "meta/robospa_episodes.jsonl", "meta/robospa_events.jsonl"
-BLOCK = 1 << 20
 
 
 class DatasetError(Exception):
@@ -190,11 +189,8 @@ def read_sums(folder: Path) -> dict[str, str]:
 
 def file_hash(path: Path) -> str:
     """SHA-256 of the file `path`, in hexadecimal digits."""
-    digest = hashlib.sha256()
     with path.open("rb") as file:
-        while block := file.read(BLOCK):
-            digest.update(block)
-    return digest.hexdigest()
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def write_record(folder: Path, made: DatasetRecord) -> None:

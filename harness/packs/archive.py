@@ -65,27 +65,23 @@ class Archive:
 
     def files(self, model: OfficialModel) -> ModelFiles:
         """The model's files. ArchiveError, naming the first that is missing or closed to us."""
+        folder, name = self.root / "objects" / model.folder, f"base{model.model}.glb"
+        meshes = folder / "visual" / name, folder / name, folder / f"textured{model.model}.obj"
+        collision = folder / "collision" / name
         try:
-            return self._files(model)
+            if model.jointed:
+                return ModelFiles(
+                    data=self._existing(folder / model.model / "model_data.json"),
+                    urdf=self._existing(folder / model.model / "mobility.urdf"),
+                )
+            visual = self._existing(next((path for path in meshes if path.is_file()), meshes[0]))
+            return ModelFiles(
+                data=self._existing(folder / f"model_data{model.model}.json"),
+                visual=visual,
+                collision=self.inside(collision) if collision.is_file() else visual,
+            )
         except OSError as error:
             raise ArchiveError(f"{str(error.filename)!r}: {error.strerror}") from None
-
-    def _files(self, model: OfficialModel) -> ModelFiles:
-        folder = self.root / "objects" / model.folder
-        if model.jointed:
-            return ModelFiles(
-                data=self._existing(folder / model.model / "model_data.json"),
-                urdf=self._existing(folder / model.model / "mobility.urdf"),
-            )
-        name = f"base{model.model}.glb"
-        meshes = folder / "visual" / name, folder / name, folder / f"textured{model.model}.obj"
-        visual = self._existing(next((path for path in meshes if path.is_file()), meshes[0]))
-        collision = folder / "collision" / name
-        return ModelFiles(
-            data=self._existing(folder / f"model_data{model.model}.json"),
-            visual=visual,
-            collision=self.inside(collision) if collision.is_file() else visual,
-        )
 
     def _existing(self, path: Path) -> Path:
         if not path.is_file():

@@ -167,7 +167,12 @@ def digest_of(archive: Archive) -> str:
                 continue
             found.update(f"{model.name} {sizes}\n".encode())
             found.update(said)
-    found.update(files_text(archive).encode())
+    folder = archive.root / "objects" / THING
+    for category, numbers in clutter_things(archive).items():
+        for number in numbers:
+            things = sorted((folder / category / number).iterdir())
+            sizes = " ".join(f"{f.name} {f.stat().st_size}" for f in things if f.is_file())
+            found.update(f"{category}/{number} {sizes}\n".encode())
     return found.hexdigest()[:16]
 
 
@@ -175,35 +180,17 @@ def clutter_things(archive: Archive) -> Mapping[str, tuple[str, ...]]:
     """The ids of each category that are in the archive and in its list, sorted. ArchiveError for a
     list that cannot be read."""
     found: dict[str, list[str]] = {}
-    listed = _listed(archive)
+    listed: dict[str, list[str | int]] | None = None
+    path = archive.root / "objects" / THING / LIST
+    if path.is_file():
+        data = read_json(archive.inside(path), LARGEST_LIST)
+        listed = read(_List, data, repr(str(path)), ArchiveError).list_of_items
     for name in archive.clutter():
         category, _, number = name.partition("/")
-        if listed is None or number in listed.get(category, ()):
+        if listed is None or number in map(str, listed.get(category, ())):
             found.setdefault(category, []).append(number)
     return {category: tuple(numbers) for category, numbers in found.items()}
 
 
-def files_text(archive: Archive) -> str:
-    """Names and sizes of all files of the things, for a hash."""
-    folder = archive.root / "objects" / THING
-    rows = []
-    for category, numbers in clutter_things(archive).items():
-        for number in numbers:
-            files = sorted((folder / category / number).iterdir())
-            sizes = " ".join(f"{f.name} {f.stat().st_size}" for f in files if f.is_file())
-            rows.append(f"{category}/{number} {sizes}\n")
-    return "".join(rows)
-
-
 class _List(msgspec.Struct):
     list_of_items: dict[str, list[str | int]]
-
-
-def _listed(archive: Archive) -> Mapping[str, frozenset[str]] | None:
-    """The ids of each category in the list; None without one."""
-    path = archive.root / "objects" / THING / LIST
-    if not path.is_file():
-        return None
-    data = read_json(archive.inside(path), LARGEST_LIST)
-    rows = read(_List, data, repr(str(path)), ArchiveError).list_of_items
-    return {name: frozenset(map(str, ids)) for name, ids in rows.items()}
