@@ -19,8 +19,10 @@ NAMED = (
     "harness/robots/",
     "protocol/openpi.py",
     "clients/openpi.py",
+    "clients/oft.py",
 )
-"""Where else the name stands: the default, robots with the same arm, openpi's configurations."""
+"""Where else the name stands: the default, robots with the same arm, openpi's configurations, and
+what OpenVLA-OFT's server looks for in its command line."""
 
 
 def sources(*folders: str) -> list[Path]:

@@ -47,7 +47,8 @@ def demo(
         int, typer.Option(callback=PROCESSES, help="worker processes; 0 for one per core")
     ] = 0,
     films: Annotated[
-        int, typer.Option(help="mistakes to film, of different types, each beside the expert")
+        int,
+        typer.Option(min=0, help="mistakes to film, of different types, each beside the expert"),
     ] = 3,
 ) -> None:
     """See two policies evaluated over the wire: tables, and a report of both with films."""

@@ -51,7 +51,7 @@ def _task(
     """
 
     def goal(scene: Scene) -> Checklist:
-        counts = [counter(scene, scene.objects[0].name)] * scene.level
+        counts = [counter(scene, scene.objects[0].name)] * _count(scene)
         return Checklist(counts, radius=radius, figures=figures)
 
     return Task(
@@ -66,6 +66,10 @@ def _task(
         summary=summary,
         success=success,
     )
+
+
+def _count(scene: Scene) -> int:
+    return int(scene.facts["count"])
 
 
 def _words(text: TaskText, count: int, own: Sequence[str], many: str) -> Slots:
@@ -96,9 +100,9 @@ PRESS_STAPLER = _task(
     StaplerFacts,
     _stapler,
     table.presses,
-    lambda scene, name: (Press(name, arm=pressing_arm(scene, name)),) * scene.level,
+    lambda scene, name: (Press(name, arm=pressing_arm(scene, name)),) * _count(scene),
     STAPLER_TEXT,
-    lambda scene: _words(STAPLER_TEXT, scene.level, ["stapler"], "presses"),
+    lambda scene: _words(STAPLER_TEXT, _count(scene), ["stapler"], "presses"),
     "Press the stapler the given number of times.",
     "The stapler was touched by a gripper near its press point as often as asked, with at least "
     "0.1 s without a touch between presses.",
@@ -131,7 +135,7 @@ def _bell(rng: np.random.Generator, workcell: Workcell) -> table.Item:
 
 
 def _bell_slots(scene: Scene) -> Slots:
-    words = _words(BELL_TEXT, scene.level, ["bell", "closed"], "clicks")
+    words = _words(BELL_TEXT, _count(scene), ["bell", "closed"], "clicks")
     return words | acting_arm(table.side_of(scene, scene.objects[0].name))
 
 
@@ -140,7 +144,7 @@ CLICK_BELL = _task(
     BellFacts,
     _bell,
     lambda scene, name: table.presses(scene, name, closed=True),
-    lambda scene, name: (Press(name, hover=HOVER, arm=table.side_of(scene, name)),) * scene.level,
+    lambda scene, name: (Press(name, hover=HOVER, arm=table.side_of(scene, name)),) * _count(scene),
     BELL_TEXT,
     _bell_slots,
     "Click the bell the given number of times.",
@@ -237,7 +241,7 @@ def _lift_task(thing: Lifted) -> Task:
 
     def expert(scene: Scene, name: str) -> tuple[Skill, ...]:
         arms = ("left", "right") if thing.both else (table.side_of(scene, name),)
-        return (RaiseLower(name, thing.rise, scene.level, arms),)
+        return (RaiseLower(name, thing.rise, _count(scene), arms),)
 
     return _task(
         f"Lift_{thing.name.capitalize()}_Repeat",
@@ -246,7 +250,7 @@ def _lift_task(thing: Lifted) -> Task:
         lambda scene, name: counters.CycleCounter(name, *thing.tests(scene, name), THING_RADIUS),
         expert,
         LIFT_TEXT,
-        lambda scene: _words(LIFT_TEXT, scene.level, own, "lifts"),
+        lambda scene: _words(LIFT_TEXT, _count(scene), own, "lifts"),
         f"Lift the {thing.name} and put it back, the given number of times.",
         thing.success,
         ("lifts", "released", "drops"),
