@@ -1,6 +1,6 @@
 """The card of a run: what was evaluated, with what, where, and how its trials ended."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from itertools import compress
 
@@ -61,7 +61,7 @@ def headline(runs: Sequence[Run]) -> str:
     parts = (
         " to ".join(dict.fromkeys((*days[:1], *days[-1:]))),
         "suite " + some(sorted({run.manifest.suite for run in runs})),
-        _words(dict.fromkeys(name for one in cut for name in one.embodiment)),
+        ", ".join(dict.fromkeys(name for one in cut for name in one.embodiment)),
         some(list(dict.fromkeys(mode for one in cut for mode in one.mode))) + " scenes",
         some(list(dict.fromkeys(split for one in cut for split in one.split))) + " sentences",
         f"{sum(len(run.keys) for run in runs):,} trials of {counted(tasks, 'task')}",
@@ -143,14 +143,14 @@ def facts(run: Run) -> list[tuple[str, str]]:
     found = [
         ("policy", policy.name or "unknown"),
         ("sees", "the exact state" if settings.privileged else f"observations: {cameras}"),
-        ("actions", _words(f"{words}{spec[n]}" for n, words in ACTIONS.items() if spec.get(n))),
+        ("actions", ", ".join(f"{words}{spec[n]}" for n, words in ACTIONS.items() if spec.get(n))),
         ("seeding", f"{seeded}; the run's is {str(settings.run_seed)[:8]}" if spec else ""),
         ("trials", _trials(run)),
-        ("ends", _words(f"{count} {name}" for name, count in ends(run).items())),
+        ("ends", ", ".join(f"{count} {name}" for name, count in ends(run).items())),
         ("not executed as sent", "; ".join(problem_lines(run.records.values()))),
-        ("setting", _words(" ".join(x) for x in
+        ("setting", ", ".join(" ".join(x) for x in
                            (settings.embodiment, settings.mode, settings.split) if x)),
-        ("beside the paper", _words(f"sentences of {split} are {SPLITS[split]}"
+        ("beside the paper", ", ".join(f"sentences of {split} are {SPLITS[split]}"
                                     for split in settings.split if split in SPLITS)),
         ("suite", manifest.suite),
         ("departures", "; ".join(map(str, departures(manifest)))),
@@ -160,7 +160,7 @@ def facts(run: Run) -> list[tuple[str, str]]:
         ("processor", "; ".join(map(str, about.processors))),
         ("world", _pairs(about.world)),
         ("policy latency", _latency(run)),
-        ("time spent on", _words(f"{name} {100 * share:.0f} %" for name, share in
+        ("time spent on", ", ".join(f"{name} {100 * share:.0f} %" for name, share in
                                  timing(run).items() if share >= 0.005)),
         ("policy errors", "; ".join([error_rates_text(run)] * bool(policy_errors(run)) +
                                     [f"{n} {why}" for n, why in policy_errors(run)])),
@@ -178,7 +178,7 @@ def _software(about: RunAbout) -> str:
     parts = [f"{name} {version}" for name, version in about.versions.items()]
     if about.git and about.git.commit:
         parts.append(f"commit {about.git.commit[:12]}" + " with changes" * about.git.dirty)
-    return _words(parts)
+    return ", ".join(parts)
 
 
 def _latency(run: Run) -> str:
@@ -194,11 +194,7 @@ def _latency(run: Run) -> str:
 
 
 def _pairs(values: Mapping[str, object]) -> str:
-    return _words(f"{name} {_line(v)}" for name, v in values.items() if v not in (None, "", {}))
-
-
-def _words(parts: Iterable[str]) -> str:
-    return ", ".join(parts)
+    return ", ".join(f"{name} {_line(v)}" for name, v in values.items() if v not in (None, "", {}))
 
 
 def _line(value: object) -> str:

@@ -189,16 +189,13 @@ def _spread(row: TableRow, heads: tuple[str, ...], wanted: tuple[str, ...]) -> T
 def run_html(run: Run) -> str:
     """Scores, how trials ended, types of failure, and what was executed otherwise than sent."""
     counts = ", ".join(f"{count} {name}" for name, count in ends(run).items())
-    lines = [f"{counted(len(run.keys), 'trial')}: {counts}", *_lines(run), f"folder: {run.folder}"]
-    notes = "<br>".join(escape(line) for line in lines)
-    return f"{html_fragment(_scores(run))}\n<p>{notes}</p>"
-
-
-def _lines(run: Run) -> list[str]:
     kinds = Counter(NAMES[f.kind] for f in failures_of(run.records.values()).values())
     found = ", ".join(f"{count} {name}" for name, count in kinds.most_common())
     failures = [f"failures: {found}"] if found else []
-    return [*failures, *_hindrances(run)]
+    lines = [f"{counted(len(run.keys), 'trial')}: {counts}", *failures, *_hindrances(run)]
+    lines.append(f"folder: {run.folder}")
+    notes = "<br>".join(escape(line) for line in lines)
+    return f"{html_fragment(_scores(run))}\n<p>{notes}</p>"
 
 
 def _hindrances(run: Run) -> list[str]:

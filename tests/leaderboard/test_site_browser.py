@@ -261,8 +261,7 @@ def test_a_pair_that_is_missing_is_said_to_be(page: Page, pair: Path) -> None:
     page.problems[:] = [p for p in page.problems if "ERR_FILE_NOT_FOUND" not in p]
 
 
-@pytest.mark.parametrize("width", [1200, 390])
-@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize(("width", "dark"), [(1200, False), (390, True)])
 def test_both_themes_and_widths(page: Page, width: int, dark: bool) -> None:
     page.look(width, dark=dark)
     assert page.run("document.documentElement.scrollWidth") == width
