@@ -6,7 +6,7 @@ Options: the robot, how many actions a chunk has, and how many tokens of text a 
 import re
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from msgspec import Meta
@@ -18,6 +18,7 @@ from robospa.protocol.options import check_ranges, option
 from robospa.protocol.policy import MAX_HORIZON, PolicySpec
 from robospa.trial import REFERENCE
 
+T = TypeVar("T", bound=np.generic)
 NAMED = 160
 """Characters of foreign names in an error."""
 PLAIN = re.compile(r"[<>|=]?(b1|i[1248]|u[1248]|f[248])|bool|u?int(8|16|32|64)|float(16|32|64)")
@@ -86,6 +87,22 @@ def invert_grippers(chunk: object, space: ActionSpace) -> Any:
     actions: NDArray[np.float32] = chunk.copy()
     actions[:, space.grippers] = 1 - actions[:, space.grippers]
     return actions
+
+
+def last_executed(chunk: NDArray[T] | None, done: int) -> NDArray[T] | None:
+    """The action (D,) of a chunk (T, D) after which `done` actions were executed; None of none."""
+    return None if chunk is None or done <= 0 else chunk[min(done, len(chunk)) - 1]
+
+
+VIEWS = ("head", "left_wrist", "right_wrist")
+
+
+def camera_names(option: str, least: int = 0) -> tuple[str, ...]:
+    """The cameras that the option `cameras` names, in its order; a ValueError says which may be."""
+    names = tuple(filter(None, option.split(",")))
+    if not set(names) <= set(VIEWS) or len(set(names)) != len(names) or len(names) < least:
+        raise ValueError(f"option cameras={option!r}: {least} to 3 of {', '.join(VIEWS)}")
+    return names
 
 
 PIECES = re.compile(r"[^\W\d_]+|\d+|(?:[^\w\s]|_)+")

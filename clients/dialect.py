@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from robospa.protocol.client import WireClient
 
 TLS_PORT = 443
+Answer = tuple[object, Mapping[str, float]]
+"""A chunk, which is checked later, and how long its parts took [ms], by name."""
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ Arrays are sent as a .npy file in a map, which every version reads, and read in 
 msgpack-numpy's, which newer versions answer. The server stops at `kill`, which is never sent.
 """
 
+import contextlib
 import json
 import socket
 import time
@@ -28,14 +29,9 @@ from numpy.typing import NDArray
 
 from robospa.action_space import SIX_JOINT_ARMS, ActionSpace
 from robospa.clients.chunks import ChunkOptions, as_chunk, refuse_unread
-from robospa.clients.dialect import (
-    ConnectionParams,
-    Dialect,
-    Probe,
-    StatelessSession,
-)
+from robospa.clients.dialect import Answer, ConnectionParams, Dialect, Probe, StatelessSession
 from robospa.clients.numpy_msgpack import npy_form, pack, unpack
-from robospa.observation import CameraSpec, Observation, View
+from robospa.observation import CameraSpec, Observation
 from robospa.protocol import errors
 from robospa.protocol.client import violation
 from robospa.protocol.options import option
@@ -75,11 +71,8 @@ class ZeroMq:
 
     def call(self, endpoint: str, data: Mapping[str, object] | None, timeout: float) -> object:
         """The answer of an endpoint; `data` is None for one without input."""
-        request: dict[str, object] = {"endpoint": endpoint}
-        if data is not None:
-            request["data"] = data
-        if self._token is not None:
-            request["api_token"] = self._token
+        said = {"endpoint": endpoint, "data": data, "api_token": self._token}
+        request = {name: value for name, value in said.items() if value is not None}
         if self._context.closed:
             raise errors.ConnectionLost(f"the connection to {self.url} was closed after an error")
         self._socket.send(pack(request, npy_form, self._limits))
@@ -121,12 +114,13 @@ class ZeroMq:
 
 def _greeted(params: ConnectionParams) -> None:
     """Raises OSError where nobody listens, ConnectFailed for something that is not ZeroMQ."""
-    endpoint, seconds = params.endpoint, params.timeouts.connect
-    with socket.create_connection((endpoint.host, endpoint.port), seconds) as probe:
-        try:
-            said = probe.recv(len(GREETING))
-        except TimeoutError:
-            said = b""
+    endpoint, said = params.endpoint, b""
+    address = endpoint.host, endpoint.port
+    with (
+        socket.create_connection(address, params.timeouts.connect) as probe,
+        contextlib.suppress(TimeoutError),
+    ):
+        said = probe.recv(len(GREETING))
     if said[:1] + said[9:] != GREETING[:1] + GREETING[9:]:
         raise errors.ConnectFailed(f"{endpoint.url} is no ZeroMQ server: it did not greet as one")
 
@@ -194,13 +188,14 @@ class Gr00tClientOptions(ChunkOptions):
 
 @dataclass(frozen=True)
 class Modality:
-    """An entry of the server's configuration: names, their time offsets in actions, and which names
-    are declared as changes (`deltas`) or as end-effector poses."""
+    """An entry of the server's configuration: names, their time offsets in actions, which names are
+    declared as changes (`deltas`) or as end-effector poses, and whether it came as a text."""
 
     keys: tuple[str, ...] = ()
     offsets: tuple[int, ...] = (0,)
     deltas: tuple[str, ...] = ()
     poses: tuple[str, ...] = ()
+    text: bool = False
 
 
 def read_config(answer: object) -> dict[str, Modality]:
@@ -218,8 +213,8 @@ def read_config(answer: object) -> dict[str, Modality]:
 
 def _modality(value: Any) -> Modality:
     """N1.5 writes JSON as text, later versions as a map."""
-    read = value["as_json"]
-    read = json.loads(read) if isinstance(read, str) else read
+    text = isinstance(value["as_json"], str)
+    read = json.loads(value["as_json"]) if text else value["as_json"]
     keys = tuple(map(str, read["modality_keys"]))
     configs = dict(zip(keys, read.get("action_configs") or (), strict=False))
     return Modality(
@@ -227,6 +222,7 @@ def _modality(value: Any) -> Modality:
         tuple(map(int, read["delta_indices"])),
         tuple(key for key, one in configs.items() if one["rep"].upper() == "DELTA"),
         tuple(key for key, one in configs.items() if one["type"].upper() == "EEF"),
+        text,
     )
 
 
@@ -263,15 +259,17 @@ class Gr00tSession(StatelessSession):
         self._server = ZeroMq(params)
         try:
             self._server.call("ping", None, params.timeouts.hello)
-            said = self._server.call("get_modality_config", None, params.timeouts.hello)
-            self._config = read_config(said)
+            self._config = read_config(
+                self._server.call("get_modality_config", None, params.timeouts.hello)
+            )
             check_config(self._config, options)
-            self._layout = self._ask_layout(said)
+            self._layout = self._ask_layout()
         except BaseException:
             self._server.close()
             raise
-        self._video, self._state = self._config["video"], self._config.get("state", Modality())
-        past = {*self._video.offsets, *(self._state.offsets if self._state.keys else ())} - {0}
+        self._video, state = self._config["video"], self._config.get("state", Modality())
+        self._state = state if state.keys else Modality()
+        past = {*self._video.offsets, *self._state.offsets} - {0}
         spec = options.spec_of(
             "gr00t",
             cameras=tuple(CameraSpec(options.ours[key]) for key in self._video.keys),
@@ -284,13 +282,10 @@ class Gr00tSession(StatelessSession):
         }
         super().__init__("gr00t", spec, options, WARNINGS, modalities=names, layout=self._layout)
 
-    def _ask_layout(self, said: object) -> str:
-        """N1.6 and later refuse an empty observation before the model, with the name they miss: a
-        modality's, or in the simulation wrapper that of a video."""
-        if any(
-            isinstance(one, Mapping) and isinstance(one.get("as_json"), str)
-            for one in (said.values() if isinstance(said, Mapping) else ())
-        ):
+    def _ask_layout(self) -> str:
+        """N1.5 writes texts. N1.6 and later refuse an empty observation before the model, with the
+        name they miss: a modality's, or in the simulation wrapper that of a video."""
+        if self._config["video"].text:
             return "n15"
         empty: dict[str, object] = {"observation": {}, "options": None}
         try:
@@ -304,9 +299,7 @@ class Gr00tSession(StatelessSession):
         if self._layout != "n15":  # which has no such endpoint
             self._server.call("reset", {"options": None}, self._params.timeouts.reset)
 
-    def infer(
-        self, id: int, observation: Observation, timeout: float
-    ) -> tuple[object, Mapping[str, float]]:
+    def infer(self, id: int, observation: Observation, timeout: float) -> Answer:
         sent = self.encode(observation)
         data = sent if self._layout == "n15" else {"observation": sent, "options": None}
         answer = self._server.call("get_action", data, timeout)
@@ -321,30 +314,25 @@ class Gr00tSession(StatelessSession):
 
     def encode(self, observation: Observation) -> dict[str, object]:
         """The observation in the server's layout."""
-        ours = self._options.ours
-        found: dict[str, NDArray[np.generic]] = {}
-
-        def views(offsets: tuple[int, ...]) -> list[View]:
-            return [observation["history"][n] if n < 0 else observation for n in offsets]
-
-        for key in self._video.keys:
-            rows = [view["images"][ours[key]] for view in views(self._video.offsets)]
-            found[f"video.{key}"] = np.stack(rows)
-        for key in self._state.keys:
-            states = [self._robot(view["state"]) for view in views(self._state.offsets)]
-            found[f"state.{key}"] = np.stack(states)[:, self._columns(key)]
+        ours, batch = self._options.ours, ... if self._layout == "n15" else None
+        frames, views = (
+            [observation["history"][n] if n < 0 else observation for n in one.offsets]
+            for one in (self._video, self._state)
+        )
+        states = np.stack([self._robot(view["state"]) for view in views])
+        found: dict[str, dict[str, NDArray[np.generic]]] = {
+            "video": {
+                key: np.stack([view["images"][ours[key]] for view in frames])[batch]
+                for key in self._video.keys
+            },
+            "state": {key: states[:, self._columns(key)][batch] for key in self._state.keys},
+        }
         language = self._config.get("language", self._config.get("annotation", Modality()))
         texts = {key: [observation.get("instruction", "")] for key in language.keys}
-        if self._layout == "n15":
-            return {**found, **texts}
-        batch = {name: rows[None] for name, rows in found.items()}
-        if self._layout == "flat":
-            return {**batch, **texts}
-        return {
-            "video": {key: batch[f"video.{key}"] for key in self._video.keys},
-            "state": {key: batch[f"state.{key}"] for key in self._state.keys},
-            "language": {key: [text] for key, text in texts.items()},
-        }
+        if self._layout == "nested":
+            return {**found, "language": {key: [text] for key, text in texts.items()}}
+        flat = {f"{m}.{key}": rows for m, named in found.items() for key, rows in named.items()}
+        return {**flat, **texts}
 
     def _columns(self, key: str) -> slice:
         """The columns of a state or an action that the server calls `key`."""

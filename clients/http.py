@@ -93,42 +93,33 @@ class JsonServer:
         status that is not 200 (with the code BUSY while the server is not there or has no room),
         ProtocolViolation for an answer that is no JSON.
         """
-        until = time.monotonic() + timeout
-        status, reason, data = self._answer(method, path, body, timeout, until)
-        if status in UNAVAILABLE:
-            text = (
-                f"{self.url}{path} answered HTTP {status}: {_reason(data) or reason}; start the "
-                "policy server behind it, or allow more time"
-            )
-            raise errors.ServerError(BUSY, text, True)
-        if status in (http.HTTPStatus.UNAUTHORIZED, http.HTTPStatus.FORBIDDEN):
-            raise errors.Unauthorized(
-                f"{self.url}{path} refused the request: {_reason(data) or reason}"
-            )
-        if status != http.HTTPStatus.OK:
-            text = _reason(data) or reason
-            raise errors.ServerError(f"HTTP {status}", text, status >= 500, f"{self.url}{path}")
-        return self._decoded(path, data)
-
-    def _answer(
-        self, method: str, path: str, body: bytes | None, timeout: float, until: float
-    ) -> tuple[int, str, bytes]:
-        """Status, reason and body of the answer to one request, before `until`."""
+        url, until = f"{self.url}{path}", time.monotonic() + timeout
         try:
-            status, reason, data = self._exchange(method, path, body, until)
-        except STALE_CONNECTION as error:
-            if self._fresh:
-                raise self._lost(error) from error
-            self._connection.close()
-            self._connect(0.0)
             try:
                 status, reason, data = self._exchange(method, path, body, until)
-            except (OSError, http.client.HTTPException) as again:
-                raise self._failed(again, path, timeout) from again
+            except STALE_CONNECTION:
+                if self._fresh:
+                    raise
+                self._connection.close()
+                self._connect(0.0)
+                status, reason, data = self._exchange(method, path, body, until)
         except (OSError, http.client.HTTPException) as error:
-            raise self._failed(error, path, timeout) from error
+            with contextlib.suppress(OSError):
+                self.close()
+            raise call_failure(error, self.url, path, timeout) from error
         self._fresh = False
-        return status, reason, data
+        if status == http.HTTPStatus.OK:
+            try:
+                return json.loads(data)
+            except (ValueError, RecursionError) as error:
+                raise errors.ProtocolViolation(f"{url} did not answer JSON: {error}") from error
+        text = _reason(data) or reason
+        if status in UNAVAILABLE:
+            advice = "start the policy server behind it, or allow more time"
+            raise errors.ServerError(BUSY, f"{url} answered HTTP {status}: {text}; {advice}", True)
+        if status in (http.HTTPStatus.UNAUTHORIZED, http.HTTPStatus.FORBIDDEN):
+            raise errors.Unauthorized(f"{url} refused the request: {text}")
+        raise errors.ServerError(f"HTTP {status}", text, status >= 500, url)
 
     def close(self) -> None:
         self._connection.close()
@@ -180,28 +171,18 @@ class JsonServer:
         self.close()
         raise errors.ProtocolViolation(f"{self.url}{path} answered more than {MAX_ANSWER} bytes")
 
-    def _failed(self, error: Exception, path: str, timeout: float) -> Exception:
-        if isinstance(error, TimeoutError | socket.timeout):
-            self.close()
-            return errors.CallTimeout(
-                f"{self.url}{path} did not answer within {timeout:g} s; "
-                "look at the server's log, or allow more time"
-            )
-        return self._lost(error)
 
-    def _lost(self, error: Exception) -> errors.ConnectionLost:
-        with contextlib.suppress(OSError):
-            self.close()
-        reason = str(error) or type(error).__name__
-        return errors.ConnectionLost(f"the connection to {self.url} ended while waiting: {reason}")
-
-    def _decoded(self, path: str, data: bytes) -> object:
-        try:
-            return json.loads(data)
-        except (ValueError, RecursionError) as error:
-            raise errors.ProtocolViolation(
-                f"{self.url}{path} did not answer JSON: {error}"
-            ) from error
+def call_failure(
+    error: Exception, url: str, path: str, timeout: float, what: str = ""
+) -> errors.TransportError:
+    """What `error` means for a call: no answer within `timeout` s, or the end of the connection."""
+    if isinstance(error, TimeoutError):
+        return errors.CallTimeout(
+            f"{url}{path} did not answer {what}within {timeout:g} s; look at the server's log, or "
+            "allow more time"
+        )
+    reason = str(error) or type(error).__name__
+    return errors.ConnectionLost(f"the connection to {url} ended while waiting: {reason}")
 
 
 class HttpSession(StatelessSession):
@@ -236,13 +217,13 @@ class HttpSession(StatelessSession):
             answer = self._server.request("POST", self.path, body, timeout)
             if isinstance(answer, str):  # in place of actions, with status 200 (OpenVLA-OFT)
                 raise errors.ServerError(TEXT, answer, True, f"{self._server.url}{self.path}")
-        except errors.ServerError as error:
-            if error.code == BUSY:
-                raise
-            if error.code == self._silent[0]:
-                error = errors.ServerError(error.code, f"{error.message}; {self._silent[1]}", True)
-            raise error if self._answered else explain_error(error, self._params) from error
-        except errors.TransportError as error:
+        except (errors.ServerError, errors.TransportError) as error:
+            if isinstance(error, errors.ServerError):
+                if error.code == BUSY:
+                    raise
+                if error.code == self._silent[0]:
+                    text = f"{error.message}; {self._silent[1]}"
+                    error = errors.ServerError(error.code, text, True)
             raise error if self._answered else explain_error(error, self._params) from error
         self._answered = True
         return answer

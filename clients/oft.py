@@ -12,14 +12,13 @@ to 224x224 by the server, as in its training. It says nothing of itself, has no 
 every failure with HTTP 200 and the text "error".
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.clients.chunks import ChunkOptions, as_chunk
-from robospa.clients.dialect import ConnectionParams, Dialect, Probe
+from robospa.clients.chunks import ChunkOptions, as_chunk, last_executed
+from robospa.clients.dialect import Answer, ConnectionParams, Dialect, Probe
 from robospa.clients.http import TEXT, HttpSession, chunk_of, dumps
 from robospa.observation import Observation
 from robospa.protocol.errors import PolicyAnswerError
@@ -69,9 +68,7 @@ class OftSession(HttpSession):
         """The targets of the trial before are forgotten."""
         self._targets = None
 
-    def infer(
-        self, id: int, observation: Observation, timeout: float
-    ) -> tuple[object, Mapping[str, float]]:
+    def infer(self, id: int, observation: Observation, timeout: float) -> Answer:
         answer = self.ask(dumps(body(observation)).encode(), timeout)
         chunk = read_chunk(answer)
         if not self._relative or not isinstance(chunk, np.ndarray) or chunk.ndim != 2:
@@ -81,9 +78,8 @@ class OftSession(HttpSession):
     def _added(self, changes: NDArray[np.float32], observation: Observation) -> object:
         """The targets (T, D) that (T, D) changes lead to, from the target before this query on."""
         before = np.asarray(observation["state"], np.float64)
-        done = int(observation["step"]) - self._asked_at
-        if self._targets is not None and done > 0:
-            before = self._targets[min(done, len(self._targets)) - 1]
+        last = last_executed(self._targets, int(observation["step"]) - self._asked_at)
+        before = before if last is None else last
         if changes.shape[1] != len(before):
             return changes  # refused by the check that follows
         self._targets = before + np.cumsum(changes, axis=0, dtype=np.float64)

@@ -22,13 +22,14 @@ from msgspec import Meta
 from robospa.action_space import SIX_JOINT_ARMS, ActionSpace
 from robospa.clients.chunks import AnyModelOptions, as_chunk, refuse_unread
 from robospa.clients.dialect import (
+    Answer,
     ConnectionParams,
     Dialect,
     Probe,
     StatelessSession,
     explain_error,
 )
-from robospa.clients.http import array_of, has_unread_bytes
+from robospa.clients.http import array_of, call_failure, has_unread_bytes
 from robospa.observation import Observation
 from robospa.protocol import errors
 from robospa.protocol.options import option
@@ -86,18 +87,9 @@ class FramedJson:
             raise errors.ConnectionLost(f"the connection to {self.url} was closed after an error")
         try:
             answer = self._exchange(self._socket, text, deadline)
-        except TimeoutError as error:
-            self.close()
-            raise errors.CallTimeout(
-                f"{self.url} did not answer {method} within {timeout:g} s; "
-                "look at the server's log, or allow more time"
-            ) from error
         except OSError as error:
             self.close()
-            reason = str(error) or type(error).__name__
-            raise errors.ConnectionLost(
-                f"the connection to {self.url} ended while waiting: {reason}"
-            ) from error
+            raise call_failure(error, self.url, "", timeout, f"{method} ") from error
         return self._result(method, answer)
 
     def _exchange(self, sock: socket.socket, text: bytes, deadline: float) -> bytes:
@@ -195,9 +187,7 @@ class RoboTwinClientOptions(AnyModelOptions):
             raise ValueError(f"option reset={self.reset!r} is no name of a model's method")
 
 
-def robotwin_observation(
-    observation: Observation, joints: tuple[int, int] = SIX_JOINT_ARMS
-) -> dict[str, object]:
+def robotwin_observation(observation: Observation, joints: tuple[int, int]) -> dict[str, object]:
     """RoboTwin's nested observation. Joints and gripper 0..1 (1 = open), poses with w x y z."""
     state = np.asarray(observation["state"], np.float64)
     ee = np.asarray(observation["ee"], np.float64) if "ee" in observation else None
@@ -225,9 +215,7 @@ def robotwin_observation(
     return sent
 
 
-def dp_observation(
-    observation: Observation, joints: tuple[int, int] = SIX_JOINT_ARMS
-) -> dict[str, object]:
+def dp_observation(observation: Observation, joints: tuple[int, int]) -> dict[str, object]:
     """What RoboTwin's DP sends: images CHW in 0..1 and the joints, float64. The images are
     float32 here, half the bytes, and the numbers that its float64 become in the model."""
     sent: dict[str, object] = {
@@ -256,9 +244,7 @@ class RoboTwinSession(StatelessSession):
         if self._options.reset != "none":
             self._call(self._options.reset, None, self._params.timeouts.reset)
 
-    def infer(
-        self, id: int, observation: Observation, timeout: float
-    ) -> tuple[object, Mapping[str, float]]:
+    def infer(self, id: int, observation: Observation, timeout: float) -> Answer:
         until = time.monotonic() + timeout
         encode = LAYOUTS[self._options.layout]
         now = int(observation["step"])

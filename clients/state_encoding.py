@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.action_space import SIX_JOINT_ARMS, ActionSpace
+from robospa.action_space import ActionSpace
+from robospa.clients.chunks import last_executed
 from robospa.clients.model_policy import Chunk, Query
 from robospa.geometry import Array, matrix_to_quaternion, quaternion_to_matrix
 from robospa.protocol.errors import PolicyAnswerError
@@ -89,19 +90,6 @@ def ee6d_to_actions(
         return poses.reshape(len(chunk), ActionSpace("ee").width).astype(np.float32)
 
 
-def closed_to_open(
-    chunk: NDArray[np.floating[Any]],
-    closed_above: float,
-    joints: tuple[int, int] = SIX_JOINT_ARMS,
-) -> NDArray[np.float32]:
-    """(T, D) joint targets whose gripper numbers say closed, to ours, whose numbers say open."""
-    actions = np.array(chunk, dtype=np.float32)
-    for column in ActionSpace("joint", joints).grippers:
-        closed = actions[:, column]
-        actions[:, column] = np.where(np.isnan(closed), np.nan, closed <= closed_above)
-    return actions
-
-
 SPACES = {"joint": ActionSpace("joint").width, "ee": ActionSpace("ee").width, "ee6d": 2 * ARM}
 """Numbers per action, by space; of joints those of six-joint arms."""
 
@@ -143,17 +131,18 @@ class StateEncoding:
             )
         if self.space == "ee6d":
             chunk = ee6d_to_actions(answer, self.quaternions, self.rotation, self.closed_above)
-        elif self.space == "joint" and self.grippers == "closed":
-            chunk = closed_to_open(answer, self.closed_above, query.trial.joints)
         else:
             chunk = np.array(answer, np.float32)
+            if joint and self.grippers == "closed":  # where ours say open
+                columns = ActionSpace("joint", query.trial.joints).grippers
+                closed = chunk[:, columns]
+                chunk[:, columns] = np.where(np.isnan(closed), np.nan, closed <= self.closed_above)
         query.memory["chunk"], query.memory["asked_at"] = chunk, int(query.observation["step"])
         return chunk
 
     def _last_command(self, query: Query) -> Chunk | None:
         """The action executed just before this query, if that is its proprioception."""
-        chunk: Chunk | None = query.memory.get("chunk")
-        if chunk is None or self.proprio == "measured":
+        if self.proprio == "measured":
             return None
-        done = int(query.observation["step"]) - int(query.memory["asked_at"])
-        return chunk[min(done, len(chunk)) - 1] if done > 0 else None
+        done = int(query.observation["step"]) - int(query.memory.get("asked_at", 0))
+        return last_executed(query.memory.get("chunk"), done)

@@ -39,7 +39,7 @@ from robospa.clients.chunks import (
     invert_grippers,
     refuse_unread,
 )
-from robospa.clients.dialect import ConnectionParams, Dialect, Probe, StatelessSession
+from robospa.clients.dialect import Answer, ConnectionParams, Dialect, Probe, StatelessSession
 from robospa.clients.numpy_msgpack import MsgpackSocket, binary_form
 from robospa.geometry import quaternion_to_matrix
 from robospa.observation import Observation
@@ -271,9 +271,7 @@ class XPolicyLabSession(StatelessSession):
         payload = {"trial_id": self._ids["trial_id"], **self._trial}
         self._call(id, "reset", "reset_result", payload, limit)
 
-    def infer(
-        self, id: int, observation: Observation, timeout: float
-    ) -> tuple[object, Mapping[str, float]]:
+    def infer(self, id: int, observation: Observation, timeout: float) -> Answer:
         payload = {"observation": encode(observation, self._options, self._joints)}
         step = int(observation["step"])
         answer = self._call(id, "infer", "infer_result", payload, timeout, step)

@@ -22,8 +22,15 @@ from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace
 from robospa.clients import model_policy
-from robospa.clients.chunks import ChunkOptions, Count, invert_grippers, refuse_unread
-from robospa.clients.dialect import ConnectionParams, Dialect, Probe
+from robospa.clients.chunks import (
+    ChunkOptions,
+    Count,
+    camera_names,
+    invert_grippers,
+    last_executed,
+    refuse_unread,
+)
+from robospa.clients.dialect import Answer, ConnectionParams, Dialect, Probe
 from robospa.clients.http import HttpSession, chunk_of, dumps
 from robospa.clients.state_encoding import (
     ARM,
@@ -37,9 +44,6 @@ from robospa.observation import CameraSpec, Observation
 from robospa.protocol.errors import PolicyAnswerError, ProtocolViolation
 from robospa.protocol.options import option
 from robospa.protocol.policy import PolicySpec, TrialInfo
-
-VIEWS = ("head", "left_wrist", "right_wrist")
-"""Our cameras in the order of the model's views."""
 
 
 @dataclass(frozen=True)
@@ -71,14 +75,12 @@ class XvlaConventions(ChunkOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        wrong = [name for name in self.views if name not in VIEWS]
-        if wrong or len(set(self.views)) != len(self.views) or not self.views:
-            raise ValueError(f"option cameras={self.cameras!r}: one to three of {', '.join(VIEWS)}")
+        self.views  # noqa: B018
 
     @property
     def views(self) -> tuple[str, ...]:
         """Cameras in the order of the model's views."""
-        return tuple(name for name in self.cameras.split(",") if name)
+        return camera_names(self.cameras, 1)
 
     def spec_of_model(self, text_budget: int | None) -> PolicySpec:
         """The spec that these options make of a server or a model."""
@@ -139,9 +141,7 @@ class XvlaSession(HttpSession):
         self._chunk = None
         self._task = trial.task.replace("_", " ")
 
-    def infer(
-        self, id: int, observation: Observation, timeout: float
-    ) -> tuple[object, Mapping[str, float]]:
+    def infer(self, id: int, observation: Observation, timeout: float) -> Answer:
         answer = self.ask(self.body(observation), timeout)
         if not isinstance(answer, Mapping) or "action" not in answer:
             raise ProtocolViolation(
@@ -162,32 +162,27 @@ class XvlaSession(HttpSession):
         if not joint:
             how = self._options
             return ee6d_to_actions(chunk, how.quaternions, how.rotation, how.closed_above)
-        actions: NDArray[np.float32] = (
-            chunk
-            if self._options.joint_grippers == "open"
-            else invert_grippers(chunk, ActionSpace("joint"))
-        )
-        return actions
+        closed = self._options.joint_grippers == "closed"
+        return invert_grippers(chunk, ActionSpace("joint")) if closed else chunk
 
     def body(self, observation: Observation) -> bytes:
-        sent: dict[str, object] = {}
-        for place, name in enumerate(self._options.views):
-            image = observation["images"][name]
-            sent[f"image{place}"] = dumps(
-                image if self._options.colors == "rgb" else image[..., ::-1]
-            )
-        sent["proprio"] = dumps(self.proprio(observation))
-        instruction = observation.get("instruction", "")
-        sent["language_instruction"] = (
-            instruction if self._options.text == "instruction" else self._task
-        )
-        sent["domain_id"] = self._options.domain_id
-        sent["steps"] = self._options.steps
+        how, images = self._options, observation["images"]
+        turn = 1 if how.colors == "rgb" else -1
+        own = how.text == "instruction"
+        sent = {
+            **{f"image{n}": dumps(images[name][..., ::turn]) for n, name in enumerate(how.views)},
+            "proprio": dumps(self.proprio(observation)),
+            "language_instruction": observation.get("instruction", "") if own else self._task,
+            "domain_id": how.domain_id,
+            "steps": how.steps,
+        }
         return dumps(sent).encode()
 
     def proprio(self, observation: Observation) -> NDArray[np.float64]:
         """The robot's state as the model reads it."""
-        last = self._last_command(observation)
+        last = None
+        if self._options.proprio == "commanded":
+            last = last_executed(self._chunk, int(observation["step"]) - self._asked_at)
         if self._options.space == "joint":
             state = np.array(observation["state"] if last is None else last, dtype=float)
             if self._options.joint_grippers == "closed":
@@ -197,12 +192,6 @@ class XvlaSession(HttpSession):
         poses = observation["ee"] if last is None else last.reshape(2, 8)
         how = self._options
         return poses_to_ee6d(np.asarray(poses), how.quaternions, how.rotation)
-
-    def _last_command(self, observation: Observation) -> NDArray[np.float32] | None:
-        if self._chunk is None or self._options.proprio == "measured":
-            return None
-        done = int(observation["step"]) - self._asked_at
-        return self._chunk[min(done, len(self._chunk)) - 1] if done > 0 else None
 
 
 def recognise(probe: Probe) -> bool:
