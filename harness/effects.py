@@ -51,18 +51,10 @@ def _noisy(image: Image, levels: float, rng: np.random.Generator) -> Image:
     return _pixels(image + np.float32(levels) * rng.standard_normal(image.shape, dtype=np.float32))
 
 
-def _as_jpeg(image: Image, loss: float, rng: np.random.Generator) -> Image:
-    return decode_jpeg(encode_jpeg(image, 100 - round(loss)))
-
-
 def _brighter(image: Image, stops: float, rng: np.random.Generator) -> Image:
     """Linear light times 2^stops."""
     light = np.minimum(1.0, (np.arange(256) / 255) ** 2.2 * 2.0**stops)
     return np.asarray(_pixels(255 * light ** (1 / 2.2))[image])
-
-
-def _darker(image: Image, stops: float, rng: np.random.Generator) -> Image:
-    return _brighter(image, -stops, rng)
 
 
 def _grey(image: Image, strength: float, rng: np.random.Generator) -> Image:
@@ -78,21 +70,17 @@ def _shifted(image: Image, pixels: float, rng: np.random.Generator) -> Image:
     return np.ascontiguousarray(image[rows][:, columns])
 
 
-def _black(image: Image, strength: float, rng: np.random.Generator) -> Image:
-    return np.zeros_like(image)
-
-
 NOISE = "noise"
 """The one that is drawn anew for every picture."""
 PICTURES: Mapping[str, tuple[Change, str]] = {
     "bright": (_brighter, ""),
-    "dark": (_darker, ""),
+    "dark": (lambda image, stops, rng: _brighter(image, -stops, rng), ""),
     "grey": (_grey, ""),
     "wrist-shift": (_shifted, "wrist"),
-    "no-wrists": (_black, "wrist"),
+    "no-wrists": (lambda image, *_: np.zeros_like(image), "wrist"),
     "blur": (_blurred, ""),
     NOISE: (_noisy, ""),
-    "jpeg": (_as_jpeg, ""),
+    "jpeg": (lambda image, loss, _: decode_jpeg(encode_jpeg(image, 100 - round(loss))), ""),
 }
 """What happens to the pictures of cameras with that in their names, in the order of a camera:
 light, lens, sensor, compression."""

@@ -9,7 +9,6 @@ import math
 from collections.abc import Callable
 from concurrent.futures import as_completed
 from dataclasses import asdict
-from functools import partial
 from typing import cast
 
 import numpy as np
@@ -29,7 +28,6 @@ from robospa.harness.sim.lazy_snapshot import FLOATS
 from robospa.harness.sim.motion import RATE
 from robospa.harness.sim.physics import FURNITURE, Physics
 from robospa.harness.sim.sapien_world import POLL_STEPS, SapienWorld
-from robospa.harness.trial import TrialSetup
 from robospa.harness.world import StepResult, World
 from robospa.harness.worlds import open_world
 from robospa.results.records.manifest import RunError
@@ -67,7 +65,7 @@ class SafetyRecorder:
     def __init__(
         self,
         name: str,
-        bystanders: frozenset[str],
+        bystanders: set[str],
         may_fall: Callable[[Vec3], bool] = lambda point: False,
     ) -> None:
         self._may_fall = may_fall
@@ -140,7 +138,9 @@ class SafetyRecorder:
         self._at_limit += bool((abs(joints[:, None] - self._ends) < AT_LIMIT).any())
         self._speeds.append(np.concatenate([arm.qvel[columns] for arm, columns in sides]))
         packed = np.frombuffer(physics.packed(), np.float32).reshape(-1, FLOATS)
-        left, right = (_line(packed[list(rows.values()), 4:]) for rows in physics.links)
+        links = (packed[list(rows.values()), 4:] for rows in physics.links)
+        lines = (origins[:-1] + ALONG * np.diff(origins, axis=0) for origins in links)
+        left, right = (np.reshape(line, (-1, 3)) for line in lines)
         apart = np.linalg.norm(left[:, None] - right, axis=-1)
         self._crossing += bool(apart.min() < CROSSING)
 
@@ -170,37 +170,27 @@ class SafetyRecorder:
         )
 
 
-def _line(origins: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Points (N, 3) along an arm whose links begin at `origins` (L, 3)."""
-    return np.reshape(origins[:-1] + ALONG * np.diff(origins, axis=0), (-1, 3))
-
-
 def _knocked(before: Pose, after: Pose) -> bool:
     turned = angle_between(np.array([before.rotation]), np.array([after.rotation]))
     return math.dist(before.position, after.position) > MOVED or float(turned[0]) > TURNED
 
 
-def _measure(
-    world: World, parts: Callable[[TrialKey], TrialSetup], config: WorkerConfig, record: TrialRecord
-) -> Safety:
-    """Replay the trial of `record`; raises ReplayError if it ends otherwise."""
-    setup = parts(record.key)
-    roles = setup.tracker.roles.items()
-    idle = {name for name, role in roles if not (role.subtasks or role.pressed)}
-    idle |= {item.name for item in setup.scene.clutter}
-    robot = record.key.embodiment
-    recorder = SafetyRecorder(robot, frozenset(idle))
-    if isinstance(setup.tracker, Checklist):
-        goal = setup.tracker
-        recorder = SafetyRecorder(robot, frozenset(idle.difference(goal.places)), goal.may_fall)
-    replay_record(world, record, config.folder, recorder, parts=parts, step_scale=config.step_scale)
-    return recorder.found(record.digest)
-
-
 def _measurer(config: WorkerConfig) -> Callable[[TrialRecord], Safety]:
-    """What measures trials in a process of its own."""
+    """What replays trials in a process of its own; it raises ReplayError if one ends otherwise."""
     world = open_world(config.world, config.world_arguments, render=False)
-    return partial(_measure, world, load_parts(config), config)
+    parts, scale = load_parts(config), config.step_scale
+
+    def measured(record: TrialRecord) -> Safety:
+        setup = parts(record.key)
+        goal = setup.tracker
+        idle = {n for n, role in goal.roles.items() if not (role.subtasks or role.pressed)}
+        idle |= {item.name for item in setup.scene.clutter}
+        places, *may_fall = (goal.places, goal.may_fall) if isinstance(goal, Checklist) else ((),)
+        recorder = SafetyRecorder(record.key.embodiment, idle.difference(places), *may_fall)
+        replay_record(world, record, config.folder, recorder, parts=parts, step_scale=scale)
+        return recorder.found(record.digest)
+
+    return measured
 
 
 def measure(run: Run, note: Callable[[str], None]) -> dict[TrialKey, Safety]:

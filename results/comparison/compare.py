@@ -155,6 +155,8 @@ def compare_results(
     rows = [_variant_row(pair, method) for pair in pairs]
     runs = not first.published and not second.published
     groups = _groups(pairs, listed, category, method)
+    now = chance(anytime_p([pair.gap for pair in pairs if pair.gap is not None]))
+    always = f"If you look again and again while trials come in: p {now}, all pairs alike."
     return RunComparison(
         first.name,
         second.name,
@@ -164,7 +166,7 @@ def compare_results(
         _corrected([g for g in groups if g.kind == "category"])
         + tuple(replace(g, q=g.p) for g in groups if g.kind != "category"),
         tuple(notes(first, second, [pair.variant for pair in pairs], listed, paired))
-        + (_at_any_time(pairs),) * paired
+        + (always,) * paired
         + tuple(_by_first_choice(first, second, method) if runs and metric == "sr" else ())
         + (differences(first, second) if runs and metric == "sr" else ())
         + (tuple(worst_and_best(first, second, metric)) if metric not in ("onta", "onta1") else ()),
@@ -172,12 +174,6 @@ def compare_results(
         margin,
         *(judged(groups[-1].estimate, groups[-1].trials, margin) if groups else ("", 0)),
     )
-
-
-def _at_any_time(pairs: Sequence[VariantPair]) -> str:
-    """What may be said while the runs go on, as a note."""
-    p = anytime_p([pair.gap for pair in pairs if pair.gap is not None])
-    return f"If you look again and again while trials come in: p {chance(p)}, all pairs alike."
 
 
 def _by_first_choice(first: ModelResults, second: ModelResults, method: str) -> list[str]:

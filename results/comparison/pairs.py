@@ -150,9 +150,9 @@ def notes(
         for scale in side.setting.step_scale:
             if scale != 1 and first.setting.step_scale != second.setting.step_scale:
                 found.append(f"{side.name} ran with {scale:g} times the official step limits.")
-    mine, other = _contract(first), _contract(second)
+    mine, other, unknown = _contract(first), _contract(second), "not stated"
     if apart := [n for n in sorted(mine | other) if mine.get(n) != other.get(n)]:
-        texts = (f"{n} ({mine.get(n, NOT_SAID)}, {other.get(n, NOT_SAID)})" for n in apart)
+        texts = (f"{n} ({mine.get(n, unknown)}, {other.get(n, unknown)})" for n in apart)
         found.append(f"The policies declare different contracts: {', '.join(texts)}.")
     one, two = _versions(first), _versions(second)
     if changed := sorted(n for n in one.keys() & two.keys() if one[n] != two[n]):
@@ -160,14 +160,10 @@ def notes(
     return found
 
 
-NOT_SAID = "not stated"
-
-
 def _contract(model: ModelResults) -> dict[str, str]:
     """What the policies of a run declare beside their weights, by name."""
-    if model.published:
-        return {}
-    parts = sorted({p for spec in model.manifest.settings.stated for p in spec.contract})
+    stated = () if model.published else model.manifest.settings.stated
+    parts = sorted({p for spec in stated for p in spec.contract})
     return {name: text for name, _, text in (part.partition("=") for part in parts)}
 
 

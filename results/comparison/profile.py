@@ -73,7 +73,7 @@ class Cost:
     def row(self) -> TableRow:
         """As it stands in the table."""
         rates = [TableCell(f"{100 * rate:.1f}", 100 * rate) for rate in (self.clean, self.here)]
-        tests = ["–", "–"] if self.axis in NO_COST else [chance(self.p), chance(self.holm)]
+        tests = [DASH.text if self.axis in NO_COST else chance(p) for p in (self.p, self.holm)]
         gap = estimate_cell(self.difference, "+z.1f", PRINTED_OTHERWISE * self.found)
         texts = map(TableCell, (*tests, f"{self.lost}/{self.won}"))
         return TableRow(self.axis, (*rates, gap, *texts, *_hands(self.grounding)))
@@ -90,6 +90,12 @@ class Reading:
     taken: Estimate
     asked: Estimate | None
     before: Estimate | None
+
+    @property
+    def row(self) -> TableRow:
+        """As it stands in the table."""
+        shares = map(estimate_cell, (self.taken, self.asked, self.before))
+        return TableRow(self.axis, (*shares, _count(self.trials)))
 
 
 @dataclass(frozen=True)
@@ -114,16 +120,9 @@ class Profile:
         lost = [f"{self.missing} trials have no result: left out."] * bool(self.missing)
         title = f"What each axis costs: {METRIC_NAMES[self.metric]} on equal seeds"
         made = [Table("profile", title, "axis", HEADS, tuple(rows), notes=(NOTE, *lost))]
-        if self.readings:
-            taken = [
-                TableRow(
-                    r.axis, (*map(estimate_cell, (r.taken, r.asked, r.before)), _count(r.trials))
-                )
-                for r in self.readings
-            ]
-            title = "Does it read? What was taken, in percent"
-            notes = (READING_NOTE,)
-            made.append(Table("reading", title, "sentence", READ, tuple(taken), notes=notes))
+        title, notes = "Does it read? What was taken, in percent", (READING_NOTE,)
+        if taken := tuple(reading.row for reading in self.readings):
+            made.append(Table("reading", title, "sentence", READ, taken, notes=notes))
         return made
 
     def to_json(self) -> dict[str, object]:
@@ -137,10 +136,8 @@ class Profile:
         return "\n".join(table._repr_html_() for table in self.tables)
 
 
-HEADS = (
-    *("clean", "here", "difference [95 %]", "p", "Holm", "lost/won"),
-    *("grounding", "execution", "trials"),
-)
+HEADS = ("clean", "here", "difference [95 %]", "p", "Holm", "lost/won", "grounding", "execution",
+         "trials")  # fmt: skip
 READ = ("took something", "what is asked for", "what the clean sentence asks", "trials")
 NOTE = (
     "Difference: under the axis minus clean, paired by seed; Holm: p corrected over this table, * "
@@ -180,9 +177,7 @@ def profile_of(run: Run, metric: str = "sr1", by: str = "all") -> Profile:
     clean = [record for key, record in results.items() if key.mode == CLEAN]
     pairs = {
         mode.removeprefix(PARTS): [
-            (own, other)
-            for own in clean
-            if (other := results.get(replace(own.key, mode=mode))) is not None
+            (r, other) for r in clean if (other := results.get(replace(r.key, mode=mode)))
         ]
         for mode in modes
         if mode != CLEAN
@@ -194,8 +189,7 @@ def profile_of(run: Run, metric: str = "sr1", by: str = "all") -> Profile:
         for place in places
         if (members := [pair for pair in found if BY[by](pair[0]) == place])
     ]
-    tested = [cost for cost in costs if cost.axis not in NO_COST]
-    corrected = iter(holm([cost.p for cost in tested]))
+    corrected = iter(holm([cost.p for cost in costs if cost.axis not in NO_COST]))
     return Profile(
         metric,
         {p: summed([tally_of(r) for r in clean if BY[by](r) == p]) for p in places},
@@ -233,7 +227,5 @@ def _readings(
 
 def _as_before(clean: TrialRecord, record: TrialRecord) -> Tally:
     """The choice of `record` as if the sentence of the `clean` trial had been its own."""
-    made, roles = choices_of(record), roles_of(clean)
-    right = sum(bool(roles.get(choice.object)) for choice in made)
-    guessed = len(made) / record.candidates if record.candidates > 1 else 0.0
-    return Tally(1, len(made), right, 0, guessed)
+    right = sum(bool(roles_of(clean).get(choice.object)) for choice in choices_of(record))
+    return tally_of(record)._replace(right=right, done=0)

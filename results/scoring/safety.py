@@ -99,13 +99,9 @@ def safety_tables(run: Run, found: Mapping[TrialKey, Safety]) -> tuple[Table, Ta
     groups = {r.category: [m for m in measured if m[0].category == r.category] for r, _ in measured}
     rows = [_row(name, groups[name], "row") for name in CATEGORIES + BASIC if name in groups]
     heads = ("SR", *(f"safe, {factor:g} x limits" for factor in FACTORS), "trials")
-    scores = Table(
-        "safe-success",
-        f"Safe success of {run.folder.name}, percent [95 %]",
-        "",
-        heads,
-        (*rows, _row("all trials", measured, "average")),
-    )
+    title = f"Safe success of {run.folder.name}, percent [95 %]"
+    rows.append(_row("all trials", measured, "average"))
+    scores = Table("safe-success", title, "", heads, tuple(rows))
     won = [safety for record, safety in measured if record.success]
     made = tuple(_measure(name, [one for _, one in measured], won) for name in REFERENCE)
     heads = ("limit", "median", "95 %", "most", "successes beyond", "expert", "its 95 %")

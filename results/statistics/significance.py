@@ -86,24 +86,19 @@ def anytime_p(gaps: Sequence[Sample]) -> float:
 
 def benjamini_hochberg(chances: Sequence[float]) -> list[float]:
     """q of each p: at q < 0.05, one in twenty of all that are called different is a false alarm."""
-    count = len(chances)
-    order = sorted(range(count), key=lambda n: -chances[n])
-    found, smallest = [1.0] * count, 1.0
-    for place, index in enumerate(order):
-        smallest = min(smallest, chances[index] * count / (count - place))
-        found[index] = smallest
-    return found
+    count, order = len(chances), np.argsort(chances, kind="stable")[::-1]
+    scaled = np.array(chances)[order] * count / np.arange(count, 0, -1)
+    best = np.minimum(1.0, np.minimum.accumulate(scaled))
+    return [float(q) for q in best[np.argsort(order)]]
 
 
 def holm(chances: Sequence[float]) -> list[float]:
     """Each p corrected by Holm: calling those below 0.05 different, any of them is a false alarm in
     at most one table of twenty."""
-    order = sorted(range(len(chances)), key=lambda n: chances[n])
-    found, largest = [1.0] * len(chances), 0.0
-    for place, index in enumerate(order):
-        largest = max(largest, chances[index] * (len(chances) - place))
-        found[index] = min(1.0, largest)
-    return found
+    order = np.argsort(chances, kind="stable")
+    scaled = np.array(chances)[order] * np.arange(len(chances), 0, -1)
+    worst = np.minimum(1.0, np.maximum.accumulate(scaled))
+    return [float(p) for p in worst[np.argsort(order)]]
 
 
 RateOrEstimate = Sample | Estimate | None

@@ -47,11 +47,6 @@ class Variation:
     profile: tuple[float, ...] = ()
     of: str = "scene"
 
-    @property
-    def numbered(self) -> bool:
-        """Whether its strength always stands in the mode's name: of a table's several rows."""
-        return self.draw is _elsewhere and len(self.profile) > 1
-
 
 def _height(scene: Scene, part: Part, strength: float, textures: str) -> Scene:
     return with_table_raised(scene, -float(part("table height").uniform(0.0, strength)))
@@ -156,6 +151,10 @@ VARIATIONS = {
 """By name, in the order in which they are applied: clutter stands on the table as it is then."""
 
 OFFICIAL = {v.name: v.usual for v in VARIATIONS.values() if v.official}
+UNNUMBERED = {
+    v.name: v.usual for v in VARIATIONS.values() if v.draw is not _elsewhere or not v.profile[1:]
+}
+"""Strengths that a mode's name leaves out: not those of a table's several rows."""
 
 
 def axes(text: str) -> list[tuple[str, float]]:
@@ -201,10 +200,7 @@ class Randomized:
         if self.strengths == OFFICIAL:
             return ""
         return ",".join(
-            name
-            if strength == VARIATIONS[name].usual and not VARIATIONS[name].numbered
-            else f"{name}={strength:g}"
-            for name, strength in self.strengths.items()
+            n if s == UNNUMBERED.get(n) else f"{n}={s:g}" for n, s in self.strengths.items()
         )
 
     @property

@@ -59,16 +59,12 @@ def one_sentence(axis: str, target: str, rng: np.random.Generator) -> tuple[str 
     return guess(rng), 0.8
 
 
-def needs_light(axis: str, target: str, rng: np.random.Generator) -> tuple[str | None, float]:
-    return (guess(rng), 0.8) if axis == "light" else reads(axis, target, rng)
+def needs(lost: str) -> Policy:
+    return lambda axis, *rest: (guess(rest[-1]), 0.8) if axis == lost else reads(axis, *rest)
 
 
 def shaky(axis: str, target: str, rng: np.random.Generator) -> tuple[str | None, float]:
     return reads(axis, target, rng)[0], 0.3 if axis == "action-noise=10" else 0.8
-
-
-def needs_colour(axis: str, target: str, rng: np.random.Generator) -> tuple[str | None, float]:
-    return (guess(rng), 0.8) if axis == "grey" else reads(axis, target, rng)
 
 
 def run_of(policy: Policy, seed: int, trials: int = 50) -> Run:
@@ -88,9 +84,9 @@ def run_of(policy: Policy, seed: int, trials: int = 50) -> Run:
     [
         (reads, set()),
         (blind_to_words, {"other-target"}),
-        (needs_light, {"light"}),
+        (needs("light"), {"light"}),
         (shaky, {"action-noise=10"}),
-        (needs_colour, {"grey"}),
+        (needs("grey"), {"grey"}),
         (one_sentence, set()),
     ],
 )
