@@ -208,19 +208,16 @@ class Probe:
         """What the server answers; the same request is sent once."""
         request = (method, path, body)
         if request not in self._answers:
-            self._answers[request] = self._ask(method, path, body)
+            connection = self.params.open_http()
+            try:
+                connection.request(method, path, body, {"Content-Type": "application/json"})
+                response = connection.getresponse()
+                self._answers[request] = HttpAnswer(response.status, response.read(ANSWER))
+            except (OSError, ValueError, http.client.HTTPException):
+                self._answers[request] = HttpAnswer(None)
+            finally:
+                connection.close()
         return self._answers[request]
-
-    def _ask(self, method: str, path: str, body: bytes | None) -> HttpAnswer:
-        connection = self.params.open_http()
-        try:
-            connection.request(method, path, body, {"Content-Type": "application/json"})
-            response = connection.getresponse()
-            return HttpAnswer(response.status, response.read(ANSWER))
-        except (OSError, ValueError, http.client.HTTPException):
-            return HttpAnswer(None)
-        finally:
-            connection.close()
 
 
 SECONDS = 1.5
@@ -281,7 +278,12 @@ def detect(params: ConnectionParams) -> Dialect | str | None:
                     return dialect
     if status is None:
         return _refused(probe)
-    return WEBSOCKET if status == 426 or _opens_websocket(probe.params) else HTTP
+    if status != 426:
+        try:
+            Transport(probe.params.websocket_address(), timeouts, SMALL).close()
+        except WireError:
+            return HTTP
+    return WEBSOCKET
 
 
 def _refused(probe: Probe) -> str | None:
@@ -298,11 +300,3 @@ def _refused(probe: Probe) -> str | None:
         return f"a gRPC server; {LEROBOT}"
     is_zmq = first[:1] == b"\xff" and first[9:10] == b"\x7f"
     return f"a ZeroMQ server of another kind; {BEING_H}" if is_zmq else None
-
-
-def _opens_websocket(params: ConnectionParams) -> bool:
-    try:
-        Transport(params.websocket_address(), params.timeouts, params.limits).close()
-    except WireError:
-        return False
-    return True

@@ -152,15 +152,13 @@ class OpenPi(ModelPolicy):
 
     def predict(self, queries: Sequence[Query]) -> list[Chunk]:
         inputs = [FamilyOptions().request(query.observation) for query in queries]
-        noise = [self._noise(query.seed) for query in queries]
+        generators = [np.random.default_rng(query.seed) for query in queries]
+        noise = [one.standard_normal(self.shape, np.float32) for one in generators]
         if self.batches and len(queries) > 1:
             answer = self.policy.infer_batch(inputs, noise=np.stack(noise))["actions"]
             return [np.array(chunk, np.float32) for chunk in answer]
         pairs = zip(inputs, noise, strict=True)
         return [np.array(self.policy.infer(i, noise=n)["actions"], np.float32) for i, n in pairs]
-
-    def _noise(self, seed: int) -> Chunk:
-        return np.random.default_rng(seed).standard_normal(self.shape, np.float32)
 
 
 def create(options: OpenPiServerOptions) -> OpenPi:

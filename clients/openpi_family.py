@@ -198,8 +198,8 @@ def _averaged(image: NDArray[np.uint8 | np.float32], new: int) -> NDArray[np.flo
 
 def shrunk(image: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
     """`image` (H, W, 3) as (size, size, 3): each new pixel is the mean of the area that it covers,
-    by OpenCV where it is installed, else to the same bits. Raises EncodeError for one that would
-    have to grow."""
+    by OpenCV where it is installed, else to the same bits, unless both sides shrink by a whole
+    number, where OpenCV sums integers. Raises EncodeError for one that would have to grow."""
     if size > min(image.shape[:2]):
         raise EncodeError(f"a picture of shape {image.shape} cannot be shrunk to size={size}")
     with contextlib.suppress(ImportError):

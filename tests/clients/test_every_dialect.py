@@ -16,7 +16,6 @@ from robospa.harness.cli.check import target_of
 from robospa.protocol.conformance import check
 from robospa.protocol.connection_limits import ServerOptions
 from robospa.protocol.errors import (
-    CallTimeout,
     ConnectFailed,
     HandshakeError,
     PolicyAnswerError,
@@ -126,14 +125,6 @@ def test_numbers_that_are_not_finite_are_the_policys_error(name: str, bad: float
         ask(name, lambda seen: chunk)
 
 
-@every_dialect
-def test_a_model_that_fails_is_the_servers_error(name: str) -> None:
-    with pytest.raises(ServerError, match="the server reported") as caught:
-        ask(name, lambda seen: 1 / 0)
-    assert caught.value.retriable
-    assert "\n" not in str(caught.value)
-
-
 @pytest.mark.parametrize("scheme", [dialect.scheme for dialect in dialects()])
 def test_a_server_that_is_down(scheme: str) -> None:
     port = free_port()
@@ -148,22 +139,6 @@ def test_greetings_hold_what_a_run_keeps(name: str) -> None:
     assert hello["spec"] == policy.spec.to_json()
     assert hello["warnings"]
     assert "horizon" in hello["options"] and "execute" in hello["options"]
-
-
-@every_dialect
-def test_a_server_that_does_not_answer_in_time(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(dialect, "SECONDS", 0.05)
-    wake = threading.Event()
-
-    def slow(seen: Any) -> Any:
-        wake.wait(20)
-        return joint_chunk()
-
-    short = Timeouts(connect=10, hello=10, reset=10, first_infer=0.05, infer=0.05, close=0.2)
-    with talking(*served(name, slow), short) as policy:
-        with pytest.raises(CallTimeout, match=r"within 0\.05 s"):
-            policy.infer(observation())
-        wake.set()
 
 
 # ---------------------------------------------------------------- the wrong dialect

@@ -18,11 +18,7 @@ from standins import DIALECTS, TRIAL, joint_chunk, observation
 
 from robospa.clients import connect, dialect
 from robospa.protocol.client import RemotePolicy
-from robospa.protocol.errors import (
-    PolicyError,
-    ServerError,
-    TransportError,
-)
+from robospa.protocol.errors import CallTimeout, PolicyError, ServerError, TransportError
 from robospa.protocol.transport import Timeouts
 
 LIMIT = Timeouts(10, 30, 30, 30, 30, 30, 30, 0.2)
@@ -210,8 +206,8 @@ def spoiled() -> Any:
 
 LATE = r"within 0\.3 s; look at the server's log"
 CASES: dict[str, tuple[type[Exception], Callable[[str], Exception], str]] = {
-    "hangs": (TransportError, broken("hang", SHORT), LATE),
-    "a byte at a time": (TransportError, broken("drip", SHORT), LATE),
+    "hangs": (CallTimeout, broken("hang", SHORT), LATE),
+    "a byte at a time": (CallTimeout, broken("drip", SHORT), LATE),
     "crashes": (TransportError, broken("cut"), "the connection to "),
     "crashes in mid-message": (TransportError, broken("half"), "the connection to "),
     "announces 2 GB": (TransportError, broken("huge"), "over|more than"),

@@ -9,7 +9,7 @@ from typing import Any
 import msgpack
 import numpy as np
 import pytest
-from model_fakes import COLORS, first, install, seen, trial
+from model_fakes import first, install, seen, trial
 from standins import (
     HEAD,
     LEFT,
@@ -191,23 +191,10 @@ def served(policy: Any) -> openpi.OpenPi:
     return openpi.OpenPi(policy, 50, 32, openpi.OpenPiServerOptions(config="c", checkpoint="x"))
 
 
-def test_the_observation_is_openpis() -> None:
+def test_the_model_is_asked_what_our_client_sends() -> None:
     policy = served(OfficialPolicy())
     observation, chunk = first(policy)
-    asked = policy.policy.calls[0]
-    assert set(asked) == {"state", "images", "prompt"}
-    assert asked["state"].shape == (14,) and asked["prompt"] == trial().instruction
-    assert np.array_equal(asked["state"], observation["state"])
-    names = {
-        "cam_high": "head",
-        "cam_left_wrist": "left_wrist",
-        "cam_right_wrist": "right_wrist",
-    }
-    assert set(asked["images"]) == set(names)
-    for theirs, ours in names.items():
-        image = asked["images"][theirs]
-        assert image.shape == (3, 240, 320) and image.dtype == np.uint8
-        assert tuple(image[:, 0, 0]) == COLORS[ours]
+    np.testing.assert_equal(policy.policy.calls[0], FamilyOptions().request(observation))
     assert chunk.shape == (50, 14) and chunk.dtype == np.float32
 
 

@@ -12,9 +12,9 @@ from robospa.protocol.openpi import from_openpi
 from robospa.protocol.policy import PolicySpec
 
 
-def openpi_client(url: str) -> Any:
+def openpi_client(url: str, key: str | None = None) -> Any:
     module = pytest.importorskip("openpi_client.websocket_client_policy")
-    return module.WebsocketClientPolicy(url)
+    return module.WebsocketClientPolicy(url, api_key=key)
 
 
 def openpi_observation(**changes: Any) -> dict[str, Any]:
@@ -63,9 +63,7 @@ def test_an_image_of_another_size_is_refused_in_one_sentence(start: Any) -> None
 
 
 def test_openpis_api_key_is_a_token(start: Any) -> None:
-    module = pytest.importorskip("openpi_client.websocket_client_policy")
-    url = start(Recall(), token="s3cret").url
-    client = module.WebsocketClientPolicy(url, api_key="s3cret")
+    client = openpi_client(start(Recall(), token="s3cret").url, "s3cret")
     assert client.infer(openpi_observation())["actions"].shape == (2, 14)
     client._ws.close()
 
