@@ -14,13 +14,8 @@ from robospa.workcell import WORKCELL
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDERS = ("tasks", "harness", "results", "clients", "baselines", "protocol", "leaderboard")
-NAMED = (
-    "robospa/trial.py",
-    "harness/robots/",
-    "protocol/openpi.py",
-    "clients/openpi.py",
-    "clients/oft.py",
-)
+OPENPI = ("protocol/openpi.py", "clients/openpi.py")
+NAMED = ("robospa/trial.py", "harness/robots/", *OPENPI, "clients/oft.py")
 """Where else the name stands: the default, robots with the same arm, openpi's configurations, and
 what OpenVLA-OFT's server looks for in its command line."""
 

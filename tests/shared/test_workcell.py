@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scene_checks import pixels
 from scipy.spatial.transform import Rotation
 
 from robospa import geometry
@@ -34,7 +35,9 @@ def test_point_on_the_optical_axis_is_the_image_centre() -> None:
 def test_edges_of_the_visible_table_are_the_official_ones(
     x: float, y: float, axis: int, edge: float
 ) -> None:
+    """By our camera, and by that of the scenes' rules, which is written apart."""
     assert CELL.head.pixel(A([x]), A([y]), TABLE_TOP)[axis][0] == pytest.approx(edge, abs=1.0)
+    assert pixels(A([x, y, TABLE_TOP]))[axis] == pytest.approx(edge, abs=1.0)
 
 
 def test_pixels_per_metre_at_the_table_centre_are_the_official_ones() -> None:

@@ -8,7 +8,6 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from drawn_scenes import FIRST_SEED, each_task, scenes
 from scene_checks import (
@@ -16,7 +15,6 @@ from scene_checks import (
     awkward,
     misplaced,
     overlaps,
-    pixels,
     sunk,
     unpickable,
     unreachable,
@@ -115,19 +113,3 @@ def test_another_rank_is_another_answer(blocks: Scene) -> None:
     rank = int(blocks.facts["size_rank"])
     wrong = replace(blocks, facts={**blocks.facts, "size_rank": rank + 1 if rank < 4 else 1})
     assert len(list(misplaced(wrong))) == 1
-
-
-@pytest.mark.parametrize(
-    ("x", "y", "axis", "edge"),
-    [
-        (0.0, -0.248, 1, 240.0),
-        (0.0, 0.432, 1, 0.0),
-        (-0.303, -0.248, 0, 0.0),
-        (0.239, -0.248, 0, 320.0),
-        (0.421, 0.432, 0, 320.0),
-    ],
-)
-def test_the_rules_camera_sees_the_official_part_of_the_table(
-    x: float, y: float, axis: int, edge: float
-) -> None:
-    assert pixels(np.array([x, y, 0.74]))[axis] == pytest.approx(edge, abs=1.0)
