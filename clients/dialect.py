@@ -47,7 +47,7 @@ class Dialect:
     options: frozen dataclass of what its servers do not say (`robospa.protocol.options`).
     open_session: connects and greets; raises the errors of `robospa.protocol.errors`.
     recognise: whether a server speaks this dialect, by a few harmless questions that run no model.
-    weak_sign: whether other servers may pass `recognise` too, so that it is asked after the others.
+    weak_sign: whether other servers may pass `recognise` too, or let it wait: it is asked last.
     sign: by what `recognise` knows it, completes "because".
     also_reaches: schemes of other dialects whose servers this one gets on with.
     deciding_options: for mistakes that `robospa check --demo` names, the option that decides them.

@@ -407,11 +407,12 @@ def dialect(name: str, **more: Any) -> Dialect:
         sign=f"its greeting has {said}" if said else "it greets unasked, with a map",
         deciding_options=DECIDING_OPTIONS,
         shared_state=preset.shared_state,
+        weak_sign=True,  # its greeting is waited for: who answers questions is asked before
         **more,
     )
 
 
-DIALECT = dialect("openpi", weak_sign=True, also_reaches=("ws",))
+DIALECT = dialect("openpi", also_reaches=("ws",))
 """Our own server also answers an openpi client."""
 STARVLA, VLLM = dialect("starvla"), dialect("vllm")
 LINGBOT = replace(dialect("lingbot"), recognise=None)
