@@ -37,7 +37,7 @@ from robospa.results.figures.series import COLOURS, DrawnFigure, Series
 from robospa.results.paper.origin import DIFFERENCES, ORIGIN
 from robospa.results.paper.published import load
 from robospa.results.report.page import FIGURES, card, figure, render
-from robospa.results.report.tables import ReportTable, for_page, method_notes, report_tables
+from robospa.results.report.report import ReportTable, for_page, method_notes, report_tables
 from robospa.results.report.trials import FailureCount, put
 from robospa.results.scoring.grounding import Grounding, table_of
 from robospa.results.scoring.models import ModelResults

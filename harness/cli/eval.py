@@ -200,7 +200,7 @@ def _curve(
 ) -> None:
     from robospa.harness.running.request import make_request
     from robospa.results.comparison.latency_curve import curve_table, latency_curve
-    from robospa.results.figures.curves import draw_latency_curves
+    from robospa.results.figures.charts import draw_latency_curves
     from robospa.results.figures.series import save, styled
     from robospa.results.records.runs import read_run
     from robospa.results.scoring.models import results_of_run

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from robospa.results.comparison.latency_curve import LatencyCurve
 from robospa.results.figures.series import (
     COLOURS,
     GRID,
@@ -13,6 +15,7 @@ from robospa.results.figures.series import (
     Series,
     label_of,
     legend_below,
+    look,
     new_figure,
     percent_of,
     plain,
@@ -212,14 +215,8 @@ def _categories(axis: Axes, of_line: list[str]) -> None:
             if line < len(of_line):
                 axis.axhline(line - 0.5, color="#ffffff", lw=1.4)
             middle = (start + line - 1) / 2
-            axis.text(
-                1.02,
-                middle,
-                of_line[start],
-                transform=axis.get_yaxis_transform(),
-                va="center",
-                fontsize=6,
-            )
+            place = axis.get_yaxis_transform()
+            axis.text(1.02, middle, of_line[start], transform=place, va="center", fontsize=6)
             start = line
 
 
@@ -305,21 +302,17 @@ def draw_failures(
     present = [k for k in kinds if any(counts[t].get(k) for t in tasks)]
     figure = new_figure(FAILURE_LINE * len(tasks) + 0.6 + 0.14 * -(-len(present) // 2))
     axis = figure.subplots()
-    left = [0.0] * len(tasks)
+    left, handles = [0.0] * len(tasks), []
     for kind in present:
         colour, hatch = FILLS[list(kinds).index(kind) % len(FILLS)]
         shares = [100 * counts[t].get(kind, 0) / sum(counts[t].values()) for t in tasks]
         axis.barh(
-            range(len(tasks)),
-            shares,
-            left=left,
-            color=colour,
-            hatch=hatch,
-            edgecolor="#ffffff",
-            lw=0.4,
-            height=0.8,
-        )
+            range(len(tasks)), shares, left=left, color=colour, hatch=hatch, edgecolor="#ffffff",
+            lw=0.4, height=0.8,
+        )  # fmt: skip
         left = [a + b for a, b in zip(left, shares, strict=True)]
+        label = names.get(kind, kind)
+        handles.append(Patch(fc=colour, hatch=hatch, ec="#ffffff", lw=0.4, label=label))
     for line, task in enumerate(tasks):
         text = str(sum(counts[task].values()))
         axis.text(101.5, line, text, va="center", fontsize=5.5, color=INK)
@@ -332,11 +325,6 @@ def draw_failures(
     axis.set_xlabel("share of failed trials [%]")
     plain(axis, "x")
     axis.tick_params(axis="y", length=0)
-    handles = []
-    for kind in present:
-        colour, hatch = FILLS[list(kinds).index(kind) % len(FILLS)]
-        label = names.get(kind, kind)
-        handles.append(Patch(fc=colour, hatch=hatch, ec="#ffffff", lw=0.4, label=label))
     if handles:
         figure.legend(handles=handles, loc="outside lower center", ncols=2, columnspacing=1.2)
     return figure
@@ -380,3 +368,41 @@ def draw_latency(all_series: Sequence[Series]) -> Figure:
 
 def _milliseconds(value: float, _: object) -> str:
     return f"{value:g}"
+
+
+MOST_LETTERS = 28
+"""Of a policy's name in the legend, beside which something stands."""
+
+
+def draw_latency_curves(curves: Sequence[LatencyCurve]) -> Figure:
+    """The figure: a line a curve; whiskers are 95 % intervals, a bar along the axis the interval of
+    the latency at which half of the success is gone."""
+    from matplotlib.lines import Line2D
+
+    figure = new_figure(2.1)
+    axis = figure.subplots()
+    handles = []
+    last = max(curve.points[-1].latency for curve in curves)
+    for i, curve in enumerate(curves):
+        style = look(i)
+        handles.append(Line2D([], [], ms=3, label=_curve_name(curve), **style))
+        whiskers(axis, [(point.latency, point.success) for point in curve.points], i)
+        if curve.half is not None and math.isfinite(curve.half.value):
+            colour, middle = style["color"], 50 * curve.points[0].success.value
+            span = [curve.half.low, min(curve.half.high, last)]
+            axis.plot(span, [2.0 - 3.0 * i] * 2, color=colour, lw=1.6, alpha=0.5)
+            axis.plot([curve.half.value] * 2, [0, middle], color=colour, lw=0.8, ls=":")
+    axis.set_ylim(min(-4, -1 - 3.0 * len(curves)), 104)
+    axis.set_xlabel("declared latency of an answer [ms]")
+    axis.set_ylabel("SR [%]")
+    plain(axis)
+    legend_below(figure, handles, 1)
+    return figure
+
+
+def _curve_name(curve: LatencyCurve) -> str:
+    """The policy, how its chunks follow each other, and where half of its success is gone."""
+    name = f"{label_of(curve.policy, MOST_LETTERS)}, {curve.clock}"
+    if curve.half is None or not math.isfinite(curve.half.value):
+        return name
+    return f"{name}: half at {curve.half.value:.0f} ms"

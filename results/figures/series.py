@@ -122,12 +122,12 @@ def styled() -> Iterator[None]:
         yield
 
 
-def new_figure(height: float, layout: str = "constrained") -> Figure:
+def new_figure(height: float) -> Figure:
     """An empty figure of one column's width, `height` [inch] high."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(WIDTH, height), layout=layout)  # type: ignore[arg-type,unused-ignore]
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
@@ -136,14 +136,10 @@ def save(figure: Figure, folder: Path, name: str, formats: Sequence[str] = FORMA
     """Write `figure` in all `formats`; the bytes depend on nothing but what it shows."""
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # one layout serves all formats
+    undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
     for ending in formats:
-        dated: dict[str, dict[str, None] | None] = {
-            "svg": {"Date": None},
-            "pdf": {"CreationDate": None},
-            "png": None,
-        }
         path = folder / f"{name}.{ending}"
-        figure.savefig(path, dpi=300, metadata=dated[ending], transparent=ending == "svg")
+        figure.savefig(path, dpi=300, metadata=undated.get(ending), transparent=ending == "svg")
 
 
 def plain(axis: Axes, grid: Literal["x", "y", "both"] = "y") -> None:
@@ -187,9 +183,7 @@ def look(index: int) -> Look:
     return {"color": COLOURS[places[0]], "marker": MARKERS[places[1]], "ls": DASHES[places[2]]}
 
 
-def whiskers(
-    axis: Axes, points: Sequence[tuple[float, Estimate]], index: int, label: str | None = None
-) -> None:
+def whiskers(axis: Axes, points: Sequence[tuple[float, Estimate]], index: int) -> None:
     """A line through the estimates (in percent) at some places, with their intervals."""
     axis.errorbar(
         [x for x, _ in points],
@@ -198,7 +192,6 @@ def whiskers(
             [max(0.0, 100 * (e.value - e.low)) for _, e in points],
             [max(0.0, 100 * (e.high - e.value)) for _, e in points],
         ],
-        label=label,
         ms=2.6,
         elinewidth=0.6,
         capsize=1.2,

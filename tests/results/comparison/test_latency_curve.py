@@ -23,7 +23,7 @@ from robospa.results.comparison.sample_size import (
     trials_for,
     trials_unpaired,
 )
-from robospa.results.figures.curves import draw_latency_curves
+from robospa.results.figures.charts import draw_latency_curves
 from robospa.results.figures.series import styled
 from robospa.results.records.runs import read_run
 from robospa.results.scoring.models import IncomparableError, ModelResults, results_of_run
