@@ -15,7 +15,7 @@ from robospa.results.failures.labels import NAMES, FailedTrials, failed_trials, 
 from robospa.results.records.action_problems import KINDS, described
 from robospa.results.records.runs import Run, finished, read_run
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.report.score_table import run_html, run_table
+from robospa.results.report.run_card import run_html, run_table
 from robospa.results.scoring.comparable import (
     asked_again,
     comparable,

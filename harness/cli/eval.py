@@ -99,7 +99,7 @@ def run_and_show(request: Request, *, as_json: bool = False) -> None:
     """
     from robospa.results.comparison.profile import profile_of
     from robospa.results.records.runs import by_setting, read_run
-    from robospa.results.report.score_table import print_scores
+    from robospa.results.report.run_card import print_scores
     from robospa.results.scoring.models import results_of_run
     from robospa.results.scoring.repeats import many_policy_errors
 

@@ -115,7 +115,7 @@ def _report(
     from robospa.results.records.runs import read_run
     from robospa.results.report.page import write_report
     from robospa.results.report.report import make_report
-    from robospa.results.report.score_table import print_scores
+    from robospa.results.report.run_card import print_scores
     from robospa.results.statistics.intervals import METHODS
 
     if ci not in METHODS:

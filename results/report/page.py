@@ -26,8 +26,7 @@ from robospa.results.records.action_problems import problem_data
 from robospa.results.records.manifest import departures
 from robospa.results.records.runs import Run
 from robospa.results.report.report import Report, draw_figures, for_page
-from robospa.results.report.run_card import about, ends, facts, headline
-from robospa.results.report.score_table import percent
+from robospa.results.report.run_card import about, ends, facts, headline, percent
 from robospa.results.report.trials import failure_counts, pair_rows, trial_rows
 from robospa.results.scoring.comparable import comparable
 from robospa.results.scoring.grounding import grounding_data, records_of

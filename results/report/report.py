@@ -29,8 +29,7 @@ from robospa.results.paper.result_tables import summary_table, task_table
 from robospa.results.paper.tables import basic_table
 from robospa.results.records.manifest import JOINTS
 from robospa.results.records.runs import Run, by_setting, finished
-from robospa.results.report.run_card import names_of
-from robospa.results.report.score_table import BESIDE, loss_lines, missing_lines
+from robospa.results.report.run_card import BESIDE, loss_lines, missing_lines, names_of
 from robospa.results.scoring.grounding import ROWS, groundings
 from robospa.results.scoring.models import (
     IncomparableError,

@@ -21,7 +21,7 @@ from robospa.results.paper.columns import published_column
 from robospa.results.paper.published import load
 from robospa.results.paper.tables import FORMATS, TABLES, make_tables, write_tables
 from robospa.results.records.runs import Run
-from robospa.results.report.score_table import score_table
+from robospa.results.report.run_card import score_table
 from robospa.results.scoring.scores import score_run
 from robospa.results.tables import (
     Table,

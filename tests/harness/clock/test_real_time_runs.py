@@ -28,7 +28,7 @@ from robospa.results.paper.columns import column_of
 from robospa.results.records.manifest import PolicySettings, RunError, WorldSettings
 from robospa.results.records.runs import Run, differences, read_run
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.report.score_table import score_table
+from robospa.results.report.run_card import score_table
 from robospa.results.scoring.models import IncomparableError, results_of_run
 from robospa.trial import TrialKey
 

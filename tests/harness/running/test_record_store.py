@@ -56,7 +56,7 @@ from robospa.results.records.runs import (
     to_line,
 )
 from robospa.results.records.trial_record import RetryRow, TrialRecord
-from robospa.results.report.score_table import print_scores
+from robospa.results.report.run_card import print_scores
 from robospa.results.scoring.models import results_of_run
 from robospa.trial import TrialKey
 

@@ -18,7 +18,7 @@ from robospa.results.records.manifest import RunManifest
 from robospa.results.records.runs import Run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.report.report import report_tables
-from robospa.results.report.score_table import rows
+from robospa.results.report.run_card import rows
 from robospa.results.scoring.models import IncomparableError
 from robospa.results.scoring.scores import score_run, to_json
 from robospa.results.tables import Table, TableCell

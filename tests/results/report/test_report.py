@@ -13,9 +13,9 @@ from robospa.results.comparison.compare import compare_results
 from robospa.results.paper.published import load
 from robospa.results.records.runs import film_name
 from robospa.results.records.trial_record import EventRow
-from robospa.results.report import score_table as tables
 from robospa.results.report.page import panels, write_report
 from robospa.results.report.report import make_report
+from robospa.results.report.run_card import percent
 from robospa.results.report.trials import event_row, happened
 from robospa.results.scoring.models import IncomparableError, results_of_run
 from robospa.results.statistics.intervals import Estimate, wilson
@@ -209,8 +209,8 @@ def test_a_video_of_a_trial_that_was_run_again_replaces_the_old_one(tmp_path: Pa
 
 
 def test_percent_has_no_negative_zero() -> None:
-    assert tables.percent(Estimate(-0.0, -0.00001, 0.1)) == "0.0 [0.0, 10.0]"
-    assert tables.percent(None) == "–"
+    assert percent(Estimate(-0.0, -0.00001, 0.1)) == "0.0 [0.0, 10.0]"
+    assert percent(None) == "–"
 
 
 def test_an_event_in_words() -> None:

@@ -13,9 +13,9 @@ from robospa.harness.report_server import LiveReport
 from robospa.harness.running.atomic_file import run_lock
 from robospa.results.lint import lint_run
 from robospa.results.records.runs import Run, in_progress, read_run, to_line
-from robospa.results.report import score_table
 from robospa.results.report.page import to_data
 from robospa.results.report.report import make_report
+from robospa.results.report.run_card import print_scores
 from robospa.results.scoring.models import results_of_run
 from robospa.results.statistics.intervals import wilson
 
@@ -119,7 +119,7 @@ def test_the_terminal_counts_what_is_still_to_run(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     run: Run = read_run(folder)
-    score_table.print_scores(run, results_of_run(run))
+    print_scores(run, results_of_run(run))
     text = capsys.readouterr().out
     assert "14 trials: 10 still to run, 3 success, 1 step limit" in text
     assert "missing" not in text

@@ -13,7 +13,7 @@ from robospa.results.records.runs import Run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.report.page import write_report
 from robospa.results.report.report import make_report
-from robospa.results.report.score_table import print_scores
+from robospa.results.report.run_card import print_scores
 from robospa.results.scoring.models import results_of_run
 from robospa.results.scoring.scores import IDLE, Scores, score, score_run
 from robospa.results.statistics.intervals import wilson
