@@ -11,7 +11,7 @@ from robospa.harness.cli.options import AsJson, print_json
 from robospa.text import plain_console
 
 if TYPE_CHECKING:
-    from robospa.harness.packs.index import Index
+    from robospa.harness.packs.official import Index
 
 MOST_FAULTS = 20
 """Sentences about models that are printed; --json has all."""
@@ -48,7 +48,7 @@ def assets(
     from dataclasses import asdict
 
     from robospa.harness.packs.archive import note, open_archive
-    from robospa.harness.packs.index import index
+    from robospa.harness.packs.official import index
 
     archive = open_archive(folder)
     if add:

@@ -3,7 +3,7 @@
 | module | |
 |---|---|
 | `episode`, `pictures` | a verified demonstration as a value, its file, its films and stills |
-| `jobs`, `maker` | making one: expert, replay, pictures |
+| `workers`, `maker` | making one: expert, replay, pictures |
 | `settings`, `collect` | what is collected, and the collection on disk, which can go on |
 | `pack`, `lerobot`, `robotwin` | the formats, each with its writer and its reader |
 | `features`, `statistics` | the columns of LeRobot's formats, and their statistics |

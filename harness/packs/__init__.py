@@ -6,6 +6,5 @@ A pack (`robospa.tasks.packs.Pack`) gives models for assets. `official` reads th
     mesh_files, urdf   what the archive's files say, and what of them is refused
     visuals, convex    a mesh as a drawing, also of robots' links, and as convex pieces
     placing     the archive's frames and points as ours, and grasps from them
-    index       what a folder holds, and which tasks can run with it
-    official    the pack
+    official    the pack, what a folder holds, and which tasks can run with it
 """

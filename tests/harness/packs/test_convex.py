@@ -10,8 +10,8 @@ from mesh_writers import Piece, hollow_staves, merged, volume, write_glb
 from robospa.harness.packs import convex
 from robospa.harness.packs.archive import ArchiveError, open_archive
 from robospa.harness.packs.convex import CORNERS, connected_parts, convex_pieces
-from robospa.harness.packs.index import index
 from robospa.harness.packs.mesh_files import RawMesh, read_shapes
+from robospa.harness.packs.official import index
 from robospa.harness.packs.visuals import shaded, thinned
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.shapes import Mesh

@@ -12,8 +12,7 @@ from made_archive import READS_MESHES, make_archive
 from mesh_writers import Piece, empty_png, glb, glb_bytes
 
 from robospa.harness.packs.archive import ArchiveError, open_archive
-from robospa.harness.packs.index import fault
-from robospa.harness.packs.official import OfficialPack
+from robospa.harness.packs.official import OfficialPack, fault
 from robospa.harness.textures import TextureFolder
 from robospa.tasks.official import official_models
 from robospa.tasks.packs import PackError

@@ -20,9 +20,8 @@ from robospa.harness.official.layout import (
 )
 from robospa.harness.packs import mesh_files as checks
 from robospa.harness.packs.archive import Archive, ArchiveError, open_archive
-from robospa.harness.packs.index import THING, clutter_things, digest_of, index
 from robospa.harness.packs.mesh_files import RawMesh, check_glb, read_mesh
-from robospa.harness.packs.official import OfficialPack
+from robospa.harness.packs.official import THING, OfficialPack, clutter_things, digest_of, index
 from robospa.harness.settings import Simulation
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import task_parts
