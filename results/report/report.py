@@ -1,7 +1,9 @@
 """The content of a report of runs: scores, tables, figures, failures and notes.
 
 Runs that cannot stand in one table (other embodiments, scenes, suites) still get their trials and
-cards, and one sentence that says why there is no table.
+cards, and one sentence that says why there is no table. Rows of tasks that no run of the report has
+are left out, so that a run of ten tasks is no page of dashes; the notes below a table say how much
+was not run. Averages over tasks that were not run stay open and are shown as dashes.
 """
 
 from __future__ import annotations
