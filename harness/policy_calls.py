@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ParamSpec, Protocol, TypeVar, runtime_checkable
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,15 +20,6 @@ P = ParamSpec("P")
 T = TypeVar("T")
 SERVER_TIMES = {"queue": "queue_ms", "infer": "infer_ms", "batch": "batch"}
 """Entries of a record's `latency` that come from the server, and what the wire calls them."""
-
-
-@runtime_checkable
-class TimesCalls(Protocol):
-    """A policy that tells its calls from waits that are not its own."""
-
-    @property
-    def call_seconds(self) -> float:
-        """What its last call took [s]."""
 
 
 class Stopwatch:
@@ -47,13 +38,14 @@ class Stopwatch:
             self.add(purpose, started)
 
     def ask(self, policy: object, work: Callable[P, T], *args: P.args, **named: P.kwargs) -> T:
-        """A call of `policy`: "waiting", and "queueing" for the wait for another trial after it."""
+        """A call of `policy`: "waiting", and "queueing" for the wait for another trial after it, if
+        its `call_seconds` tell what is its own [s]."""
         started = time.perf_counter()
         try:
             return work(*args, **named)
         finally:
             elapsed = time.perf_counter() - started
-            own = min(elapsed, policy.call_seconds) if isinstance(policy, TimesCalls) else elapsed
+            own = min(elapsed, getattr(policy, "call_seconds", elapsed))
             self.last_call = own
             for purpose, seconds in (("waiting", own), ("queueing", elapsed - own)):
                 self.seconds[purpose] = self.seconds.get(purpose, 0.0) + seconds

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from robospa.protocol.policy import PolicySpec as PolicySpec
     from robospa.protocol.policy import TrialInfo as TrialInfo
     from robospa.protocol.server import serve as serve
-    from robospa.results.comparison.compare import compare_results as compare
+    from robospa.results.comparison.compare import compare as compare
     from robospa.results.records.trial_record import TrialRecord as TrialRecord
     from robospa.results.run import LoadedRun as Run
     from robospa.results.run import load_run as load_run

@@ -42,7 +42,7 @@ from robospa.harness.running.executor import (
 )
 from robospa.harness.running.heartbeat import HeartbeatMonitor
 from robospa.harness.running.scheduler import Scheduler, TrialJob, TrialQueue
-from robospa.harness.running.status import Autoscaler, ServerStats, Status, TimeBreakdown, time_left
+from robospa.harness.running.status import Autoscaler, Status, TimeBreakdown, time_left
 from robospa.harness.running.worker import LocalExecutor, WorkerConfig, task_finder
 from robospa.results.records.manifest import Processor
 from robospa.results.records.runs import read_file
@@ -133,36 +133,6 @@ def free(slots: Sequence[Slot], extra: bool) -> Iterator[Slot]:
     for slot in sorted(idle, key=lambda s: len(beside(s, slots))):
         if not any(map(needs_worker_alone, (s.job for s in beside(slot, slots) if s.job))):
             yield slot
-
-
-def run_status(
-    now: float,
-    slots: Sequence[Slot],
-    queue: TrialQueue,
-    *,
-    cores: int,
-    servers: Sequence[ServerStats],
-    shares: Mapping[str, float],
-) -> Status:
-    """The state of a run at time `now`."""
-    ready = [slot for slot in slots if slot.ready]
-    workers = [slot for slot in slots if not slot.extra]
-    running = [
-        (queue.durations.expect(slot.job.work.key), now - slot.started)
-        for slot in ready
-        if slot.job is not None and slot.sent
-    ]
-    return Status(
-        now,
-        workers=len(workers),
-        running=len(running),
-        starting=sum(not slot.ready for slot in workers),
-        places=len(ready),
-        cores=cores,
-        servers=servers,
-        shares=shares,
-        left=time_left(queue.left(), running, len(ready)) if queue.durations.known else None,
-    )
 
 
 def stop_all(slots: Sequence[Slot], seconds: float) -> None:
@@ -504,12 +474,22 @@ class Runner:
 
     def status(self, now: float) -> Status:
         """The state of the run at time `now`."""
-        autoscaler = self._autoscaler
-        return run_status(
+        queue, local = self._queue, self.executor is None
+        ready = [slot for slot in self._slots if slot.ready]
+        workers = [slot for slot in self._slots if not slot.extra]
+        running = [
+            (queue.durations.expect(slot.job.work.key), now - slot.started)
+            for slot in ready
+            if slot.job is not None and slot.sent
+        ]
+        return Status(
             now,
-            self._slots,
-            self._queue,
-            cores=autoscaler.cores if self.executor is None else self._workers.capacity(),
+            workers=len(workers),
+            running=len(running),
+            starting=sum(not slot.ready for slot in workers),
+            places=len(ready),
+            cores=self._autoscaler.cores if local else self._workers.capacity(),
             servers=tuple(self._scheduler.servers.values()),
             shares=self.times.recent_shares(),
+            left=time_left(queue.left(), running, len(ready)) if queue.durations.known else None,
         )

@@ -19,20 +19,7 @@ ID_FILE = "wandb.txt"
 """In a run's folder: the id under which W&B knows it, so that a resumed run goes on there."""
 
 
-class RunTracker:
-    """What is told of a run while it goes on; this one tells nobody."""
-
-    def add(self, record: TrialRecord) -> None:
-        """A trial has its record."""
-
-    def finish(self, run: Run) -> None:
-        """All trials have been run."""
-
-    def close(self) -> None:
-        """Nothing else comes, whether the run has ended or was stopped."""
-
-
-class WandbTracker(RunTracker):
+class WandbTracker:
     """A run at Weights & Biases: its settings, the rates as they come, and its trials as a table.
 
     Where it goes, and with whose key, is what the variables of W&B say (WANDB_MODE, WANDB_API_KEY).
@@ -89,39 +76,39 @@ class WandbTracker(RunTracker):
 
 
 class CarefulTracker:
-    """A tracker that is left alone after its first error, which `say` is told."""
+    """What is told of a run while it goes on, if it has a `tracker`: one that is left alone after
+    its first error, which `say` is told."""
 
-    def __init__(self, tracker: RunTracker, say: Callable[[str], None]) -> None:
+    def __init__(self, tracker: WandbTracker | None, say: Callable[[str], None]) -> None:
         self._tracker, self._say = tracker, say
-        self._failed = False
 
     def add(self, record: TrialRecord) -> None:
         """A trial has its record."""
-        self._try(lambda: self._tracker.add(record))
+        self._try(lambda tracker: tracker.add(record))
 
     def finish(self, folder: Path) -> None:
         """All trials of the run in `folder` have been run."""
-        self._try(lambda: self._tracker.finish(read_run(folder)))
+        self._try(lambda tracker: tracker.finish(read_run(folder)))
 
     def close(self) -> None:
-        """Nothing else comes."""
-        self._try(self._tracker.close)
+        """Nothing else comes, whether the run has ended or was stopped."""
+        self._try(WandbTracker.close)
 
-    def _try(self, call: Callable[[], None]) -> None:
-        if self._failed:
+    def _try(self, call: Callable[[WandbTracker], None]) -> None:
+        if self._tracker is None:
             return
         try:
-            call()
+            call(self._tracker)
         except Exception as error:
-            self._failed = True
+            self._tracker = None
             reason = f"{type(error).__name__}: {error}"
             self._say(f"warning: nothing more is logged with --log, the run goes on: {reason}")
 
 
-def open_tracker(log: str, folder: Path, settings: Mapping[str, Any]) -> RunTracker:
+def open_tracker(log: str, folder: Path, settings: Mapping[str, Any]) -> WandbTracker | None:
     """The tracker that the setting `log` names; raises MissingPackage without its package."""
     name, _, project = log.partition(":")
-    return RunTracker() if name == "none" else WandbTracker(folder, project or PROJECT, settings)
+    return None if name == "none" else WandbTracker(folder, project or PROJECT, settings)
 
 
 def _identity(folder: Path) -> str:

@@ -9,6 +9,7 @@ import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 from robospa.geometry import Pose, Quat, Vec3, multiply, rotate
 from robospa.harness.sim.motion import RATE, Trajectory
@@ -22,7 +23,6 @@ _Z = FLOATS - 1  # a pose ends in its z
 
 NO_HINGES: Mapping[str, float] = MappingProxyType({})
 Pair = tuple[tuple[float, ...], tuple[float, ...]]
-_put = object.__setattr__
 _new = object.__new__
 _position, _rotation = (getattr(Pose, name).__set__ for name in ("position", "rotation"))
 
@@ -84,7 +84,11 @@ class StateLayout:
 
 
 class LazySnapshot(Snapshot):
-    """A `Snapshot` of a running world: the same values, computed when first asked for."""
+    """A `Snapshot` of a running world: the same values, computed when first asked for.
+
+    Their slots are empty until then. RuntimeError if contacts or measured joints of a poll's
+    snapshot are first asked for after the world moved on.
+    """
 
     GIVEN = (
         "_steps",
@@ -96,7 +100,7 @@ class LazySnapshot(Snapshot):
         "_commanded",
         "_measure",
     )
-    __slots__ = (*GIVEN, "_ends", "_grasps", "_grippers", "_points", "_table")
+    __slots__ = GIVEN
 
     _packed: bytes
     _floats: memoryview
@@ -106,11 +110,6 @@ class LazySnapshot(Snapshot):
     _steps: int
     _measure: Callable[[int], Pair]
     _touching: Callable[[int], tuple[Contact, ...]]
-    _grippers: tuple[float, float]
-    _points: tuple[Contact, ...]
-    _table: PoseTable
-    _ends: tuple[Pose, Pose]
-    _grasps: tuple[Vec3, Vec3]
 
     def __init__(
         self,
@@ -136,15 +135,13 @@ class LazySnapshot(Snapshot):
         _commanded(self, commanded)
         _measure(self, measure)
 
-    @property
-    def poses(self) -> Mapping[str, Pose]:
-        """Poses of the objects that exist."""
-        try:
-            return self._table
-        except AttributeError:
-            table = PoseTable(self._packed, self._rows)
-            _put(self, "_table", table)
-            return table
+    def __getattr__(self, name: str) -> Any:
+        """Fill the slot `name`, which is empty."""
+        if name not in COMPUTED:
+            raise AttributeError(f"a snapshot has no {name!r}")
+        value = COMPUTED[name](self)
+        object.__setattr__(self, name, value)
+        return value
 
     def height(self, name: str) -> float:
         """Height [m] of the object's origin: goals ask for it of every object at every poll."""
@@ -162,37 +159,14 @@ class LazySnapshot(Snapshot):
         floats = self._floats
         return (floats[at], floats[at + 1], floats[at + 2])
 
-    @property
-    def gripper(self) -> tuple[float, float]:
-        """Commanded grippers."""
-        try:
-            return self._grippers
-        except AttributeError:
-            path, row = self._commanded
-            left, right = path.commanded[:, row].tolist()
-            _put(self, "_grippers", (left, right))
-            return left, right
+    def _gripper(self) -> tuple[float, float]:
+        path, row = self._commanded
+        left, right = path.commanded[:, row].tolist()
+        return left, right
 
-    @property
-    def end_effector(self) -> tuple[Pose, Pose]:
-        """Measured end-effector frames."""
-        try:
-            return self._ends
-        except AttributeError:
-            left, right = self._layout.tools
-            ends = (self._tool(*left), self._tool(*right))
-            _put(self, "_ends", ends)
-            return ends
-
-    @property
-    def grasp_points(self) -> tuple[Vec3, Vec3]:
-        """Measured grasp centres."""
-        try:
-            return self._grasps
-        except AttributeError:
-            points = grasp_points(self._layout.grippers, self.end_effector)
-            _put(self, "_grasps", points)
-            return points
+    def _end_effector(self) -> tuple[Pose, Pose]:
+        left, right = self._layout.tools
+        return self._tool(*left), self._tool(*right)
 
     def _tool(self, row: int, tool: Pose) -> Pose:
         """`unpack(packed, row) * tool`, with the quaternion whose w is not negative."""
@@ -202,29 +176,23 @@ class LazySnapshot(Snapshot):
         turn = (w, a, b, c) if w >= 0.0 else (-w, -a, -b, -c)
         return _pose((px + x, py + y, pz + z), turn)
 
-    @property
-    def joints(self) -> Pair:
-        """Commanded joints."""
+    def _joints(self) -> Pair:
         path, row = self._commanded
         left, right = path.joints[:, row].tolist()
         a, b = self._layout.joints
         return tuple(left[:a]), tuple(right[:b])
 
-    @property
-    def contacts(self) -> tuple[Contact, ...]:
-        """Contacts; RuntimeError if a poll's are first asked for after the world moved on."""
-        try:
-            return self._points
-        except AttributeError:
-            points = self._touching(self._steps)
-            _put(self, "_points", points)
-            return points
 
-    @property
-    def measured(self) -> Pair:
-        """Measured joints; RuntimeError if a poll's snapshot is asked after the world moved on."""
-        return self._measure(self._steps)
-
+COMPUTED: Mapping[str, Callable[[LazySnapshot], object]] = {
+    "poses": lambda seen: PoseTable(seen._packed, seen._rows),
+    "gripper": LazySnapshot._gripper,
+    "end_effector": LazySnapshot._end_effector,
+    "grasp_points": lambda seen: grasp_points(seen._layout.grippers, seen.end_effector),
+    "joints": LazySnapshot._joints,
+    "contacts": lambda seen: seen._touching(seen._steps),
+    "measured": lambda seen: seen._measure(seen._steps),
+}
+"""What fills each slot of a `Snapshot` that is not given."""
 
 # Slots of a frozen class can only be filled from outside; their descriptors do so fastest.
 _time, _hinges = (getattr(Snapshot, name).__set__ for name in ("time", "hinges"))
