@@ -37,26 +37,25 @@ STILL_CODECS = ("png", "jpeg")
 
 
 @dataclass(frozen=True)
-class EpisodeFilm:
-    """All frames of a camera as one MP4 file, `data`, in the order of the episode."""
+class Camera:
+    """How a camera's pictures are kept."""
 
-    codec: Annotated[str, one_of(FILM_CODECS)]
+    codec: Annotated[str, one_of((*FILM_CODECS, *STILL_CODECS))]
     width: Pixels
     height: Pixels
-    data: bytes = field(repr=False)
+
+    @property
+    def filmed(self) -> bool:
+        """True if they are one film, False if they are stills."""
+        return self.codec in FILM_CODECS
 
 
 @dataclass(frozen=True)
-class Stills:
-    """The frames of a camera one by one, each a whole file in true colours (RGB)."""
+class Pictures(Camera):
+    """All frames of a camera in the order of the episode: one MP4 file, or a whole file for each,
+    in true colours (RGB)."""
 
-    codec: Annotated[str, one_of(STILL_CODECS)]
-    width: Pixels
-    height: Pixels
-    frames: tuple[bytes, ...] = field(repr=False)
-
-
-Pictures = EpisodeFilm | Stills
+    files: tuple[bytes, ...] = field(default=(), repr=False)
 
 
 @dataclass(frozen=True)
@@ -135,8 +134,8 @@ class DatasetEpisode:
             if found != shape:
                 raise ValueError(f"{name} has the shape {found}, not {shape}")
         for camera, seen in self.pictures.items():
-            if isinstance(seen, Stills) and len(seen.frames) != frames:
-                raise ValueError(f"camera {camera} has {len(seen.frames)} frames, not {frames}")
+            if not seen.filmed and len(seen.files) != frames:
+                raise ValueError(f"camera {camera} has {len(seen.files)} frames, not {frames}")
 
     def __len__(self) -> int:
         """Its number of frames, T."""
@@ -176,13 +175,16 @@ class EpisodeFileError(Exception):
 
 
 @dataclass(frozen=True)
-class _Camera:
+class _Kept(Camera):
     """What is said of a camera's pictures; they are files of their own."""
 
-    codec: Annotated[str, one_of((*FILM_CODECS, *STILL_CODECS))]
-    width: Pixels
-    height: Pixels
     frames: int = 0
+
+    def names(self, camera: str) -> list[str]:
+        """Of these files."""
+        if self.filmed:
+            return [f"{camera}.mp4"]
+        return [f"{camera}/{t:06d}.{ENDINGS[self.codec]}" for t in range(self.frames)]
 
 
 @dataclass(frozen=True)
@@ -201,7 +203,7 @@ class _Header:
     scene_digest: str
     replay_digest: str
     failure: str
-    cameras: dict[str, _Camera]
+    cameras: dict[str, _Kept]
     about: dict[str, str]
 
 
@@ -212,7 +214,7 @@ SAME = [field.name for field in fields(_Header) if field.name not in ("format", 
 def episode_bytes(episode: DatasetEpisode) -> bytes:
     """The content of the file of `episode`."""
     cameras = {
-        camera: _Camera(seen.codec, seen.width, seen.height, len(episode))
+        camera: _Kept(seen.codec, seen.width, seen.height, len(episode))
         for camera, seen in episode.pictures.items()
     }
     same = {name: getattr(episode, name) for name in SAME}
@@ -227,11 +229,8 @@ def episode_bytes(episode: DatasetEpisode) -> bytes:
         for name, dtype in ARRAYS.items():
             put(f"{name}.npy", _npy(np.asarray(getattr(episode, name), dtype)))
         for camera, seen in episode.pictures.items():
-            if isinstance(seen, EpisodeFilm):
-                put(f"{camera}.mp4", seen.data)
-            else:
-                for t, frame in enumerate(seen.frames):
-                    put(_still_name(camera, t, seen.codec), frame)
+            for name, data in zip(cameras[camera].names(camera), seen.files, strict=True):
+                put(name, data)
     return stream.getvalue()
 
 
@@ -263,24 +262,11 @@ def _read(file: zipfile.ZipFile) -> DatasetEpisode:
     header = read(_Header, data, HEADER, EpisodeFileError)
     same = {name: getattr(header, name) for name in SAME}
     same |= {name: _array(file, name, dtype) for name, dtype in ARRAYS.items()}
-    found = _pictures(file, header.cameras)
+    found = {
+        name: Pictures(of.codec, of.width, of.height, tuple(map(file.read, of.names(name))))
+        for name, of in header.cameras.items()
+    }
     return DatasetEpisode(**same, pictures=found, about=header.about)
-
-
-def _pictures(file: zipfile.ZipFile, cameras: Mapping[str, _Camera]) -> dict[str, Pictures]:
-    found: dict[str, Pictures] = {}
-    for name, seen in cameras.items():
-        size = (seen.codec, seen.width, seen.height)
-        if seen.codec in FILM_CODECS:
-            found[name] = EpisodeFilm(*size, file.read(f"{name}.mp4"))
-        else:
-            frames = (_still_name(name, t, seen.codec) for t in range(seen.frames))
-            found[name] = Stills(*size, tuple(map(file.read, frames)))
-    return found
-
-
-def _still_name(camera: str, t: int, codec: str) -> str:
-    return f"{camera}/{t:06d}.{ENDINGS[codec]}"
 
 
 def _npy(array: NDArray[np.generic]) -> bytes:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import ARMS, ActionSpace
-from robospa.harness.datasets.episode import ENDINGS, FILM_CODECS, DatasetEpisode, Pictures, Stills
+from robospa.harness.datasets.episode import ENDINGS, Camera, DatasetEpisode, Pictures
 from robospa.harness.datasets.pictures import FPS
 from robospa.observation import NAMES
 
@@ -32,20 +32,6 @@ NOTHING = ""
 
 class EpisodeMisfit(Exception):
     """An episode does not fit the data set it is to join; the message says how."""
-
-
-@dataclass(frozen=True)
-class Camera:
-    """How a camera's pictures are stored: `codec` is h264, av1, png or jpeg; sizes in pixels."""
-
-    codec: str
-    width: int
-    height: int
-
-    @property
-    def filmed(self) -> bool:
-        """True if they are films, False if they are stills in the rows."""
-        return self.codec in FILM_CODECS
 
 
 @dataclass(frozen=True)
@@ -69,7 +55,7 @@ class EpisodeLayout:
 
     @property
     def stills(self) -> list[str]:
-        """The others."""
+        """The others, whose pictures lie in the rows."""
         return [name for name, camera in self.cameras.items() if not camera.filmed]
 
     def check(self, episode: DatasetEpisode) -> None:
@@ -290,9 +276,8 @@ def frame_table(
             columns[name] = pa.FixedSizeListArray.from_arrays(flat, values.shape[1])
     for camera in layout.stills:
         seen = pictures[camera]
-        if isinstance(seen, Stills):
-            key, ending = picture_key(camera), ENDINGS[seen.codec]
-            named = ((f"frame-{t:06d}.{ending}", data) for t, data in enumerate(seen.frames))
-            images = [{"bytes": data, "path": name} for name, data in named]
-            columns[key] = pa.array(images, schema.field(key).type)
+        key, ending = picture_key(camera), ENDINGS[seen.codec]
+        named = ((f"frame-{t:06d}.{ending}", data) for t, data in enumerate(seen.files))
+        images = [{"bytes": data, "path": name} for name, data in named]
+        columns[key] = pa.array(images, schema.field(key).type)
     return pa.table([columns[name] for name in schema.names], schema=schema)

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.harness.datasets import features
-from robospa.harness.datasets.episode import DatasetEpisode, EpisodeFilm
+from robospa.harness.datasets.episode import DatasetEpisode
 from robospa.harness.datasets.features import EpisodeLayout, picture_key
 from robospa.harness.datasets.manifest import EpisodeLine, json_line
 from robospa.harness.datasets.pictures import FPS, JoinedFilm, check_film, colours, frame_count
@@ -138,12 +138,11 @@ class LeRobotV21(LeRobotWriter):
         path.parent.mkdir(parents=True, exist_ok=True)
         pq.write_table(features.frame_table(self._layout, numbers, episode.pictures), path)
         for camera in self._layout.films:
-            film = episode.pictures[camera]
-            assert isinstance(film, EpisodeFilm)  # the layout's check
-            check_film(film.data, len(episode))
+            (film,) = episode.pictures[camera].files
+            check_film(film, len(episode))
             video = self._folder / self.paths[1].format(video_key=picture_key(camera), **where)
             video.parent.mkdir(parents=True, exist_ok=True)
-            video.write_bytes(film.data)
+            video.write_bytes(film)
         self._episodes.write(json_line(self._row(episode)))
         plain = {  # this version has no quantiles
             feature: {n: value.tolist() for n, value in of.items() if n not in QUANTILES}
@@ -215,9 +214,8 @@ class LeRobotV3(LeRobotWriter):
     def _add_films(self, episode: DatasetEpisode) -> JsonObject:
         found: JsonObject = {}
         for camera, files in self._films.items():
-            film = episode.pictures[camera]
-            assert isinstance(film, EpisodeFilm)  # the layout's check
-            file, start = files.add(film.data, len(episode))
+            (film,) = episode.pictures[camera].files
+            file, start = files.add(film, len(episode))
             place = f"videos/{picture_key(camera)}"
             found[f"{place}/chunk_index"], found[f"{place}/file_index"] = file
             found[f"{place}/from_timestamp"] = start

@@ -16,13 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.extras import need
-from robospa.harness.datasets.episode import (
-    FILM_CODECS,
-    STILL_CODECS,
-    EpisodeFilm,
-    Pictures,
-    Stills,
-)
+from robospa.harness.datasets.episode import FILM_CODECS, STILL_CODECS, Pictures
 from robospa.harness.datasets.statistics import ColourHistogram
 from robospa.observation import CameraSpec
 
@@ -170,7 +164,7 @@ class FilmSink:
         import av
 
         os.environ.setdefault("SVT_LOG", "1")  # else the AV1 encoder prints its settings
-        self._av, self._camera, self._codec = av, camera, codec
+        self._av = av
         self._bytes = io.BytesIO()
         self._file = cast(Any, av.open(self._bytes, "w", format="mp4"))
         encoder, options = ENCODERS[codec]
@@ -189,22 +183,20 @@ class FilmSink:
         self._frames += 1
         self._file.mux(self._stream.encode(frame))
 
-    def finish(self) -> EpisodeFilm:
+    def finish(self) -> tuple[bytes]:
         """The whole film."""
         self._file.mux(self._stream.encode())
         self._file.close()
-        return EpisodeFilm(
-            self._codec, self._camera.width, self._camera.height, self._bytes.getvalue()
-        )
+        return (self._bytes.getvalue(),)
 
 
 class StillSink:
-    """A file of its own for every frame of `camera`."""
+    """A file of its own for every frame of a camera."""
 
-    def __init__(self, camera: CameraSpec, codec: str) -> None:
+    def __init__(self, _: CameraSpec, codec: str) -> None:
         from PIL import Image
 
-        self._image, self._camera, self._codec = Image, camera, codec
+        self._image, self._codec = Image, codec
         self._frames: list[bytes] = []
 
     def add(self, image: Picture) -> None:
@@ -217,10 +209,9 @@ class StillSink:
             made.save(stream, "JPEG", quality=JPEG_QUALITY)
         self._frames.append(stream.getvalue())
 
-    def finish(self) -> Stills:
+    def finish(self) -> tuple[bytes, ...]:
         """All of them."""
-        size = (self._camera.width, self._camera.height)
-        return Stills(self._codec, *size, tuple(self._frames))
+        return tuple(self._frames)
 
 
 def encode(
@@ -238,7 +229,10 @@ def encode(
     for images in frames:
         for sink, image in zip(sinks, images, strict=True):
             sink.add(image)
-    return {camera.name: sink.finish() for camera, sink in zip(cameras, sinks, strict=True)}
+    return {
+        camera.name: Pictures(codec, camera.width, camera.height, sink.finish())
+        for camera, sink in zip(cameras, sinks, strict=True)
+    }
 
 
 def require(codec: str) -> None:
@@ -255,26 +249,24 @@ def require(codec: str) -> None:
 def colours(seen: Pictures) -> ColourHistogram:
     """The colours of about `SAMPLED` evenly spread pictures."""
     found = ColourHistogram()
-    if isinstance(seen, EpisodeFilm):
-        some = film_frames(seen.data, SAMPLED)
+    if seen.filmed:
+        some = film_frames(seen.files[0], SAMPLED)
     else:
-        places = np.linspace(0, len(seen.frames) - 1, SAMPLED).round().astype(int)
-        some = (still_picture(seen, t) for t in np.unique(places).tolist())
+        places = np.linspace(0, len(seen.files) - 1, SAMPLED).round().astype(int)
+        some = (_still(seen.files[t]) for t in np.unique(places).tolist())
     for picture in some:
         found.add(picture)
     return found
 
 
-def still_picture(seen: Stills, t: int) -> NDArray[np.uint8]:
-    """Frame `t`, uint8 (height, width, 3) RGB."""
+def _still(data: bytes) -> Picture:
+    """The picture in a file, uint8 (height, width, 3) RGB."""
     from PIL import Image
 
-    with Image.open(io.BytesIO(seen.frames[t])) as picture:
+    with Image.open(io.BytesIO(data)) as picture:
         return np.asarray(picture.convert("RGB"))
 
 
-def all_pictures(seen: Pictures) -> Iterator[NDArray[np.uint8]]:
+def all_pictures(seen: Pictures) -> Iterator[Picture]:
     """All frames, uint8 (height, width, 3) RGB."""
-    if isinstance(seen, EpisodeFilm):
-        return film_frames(seen.data)
-    return (still_picture(seen, t) for t in range(len(seen.frames)))
+    return film_frames(seen.files[0]) if seen.filmed else map(_still, seen.files)

@@ -132,20 +132,13 @@ def _idle(record: TrialRecord) -> str:
 def _spatial(record: TrialRecord) -> Cause | None:
     """The selection is the first object that a gripper touched in closing, or lifted."""
     roles = roles_of(record)
-    beside: EventRow | None = None
-    lost: EventRow | None = None
-    reached: EventRow | None = None
-    chosen: EventRow | None = None
+    first: dict[str, EventRow] = {}
     for event in record.events:
-        kind, note = event["kind"], event.get("note", "")
-        if kind == "grasped" or (kind == "closed" and note == "touching"):
-            chosen = chosen or event
-        elif kind == "closed":
-            beside = beside or event
-        elif kind == "dropped":
-            lost = lost or event
-        elif kind in ("approached", "wrong_object"):
-            reached = reached or event
+        kind = event["kind"]
+        if kind == "grasped" or (kind == "closed" and event.get("note") == "touching"):
+            kind = "chosen"
+        first.setdefault("approached" if kind == "wrong_object" else kind, event)
+    chosen, lost, beside, reached = map(first.get, ("chosen", "dropped", "closed", "approached"))
     if chosen is not None:
         name = chosen["object"]
         if not roles.get(name):

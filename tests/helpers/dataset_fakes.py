@@ -3,7 +3,7 @@
 import numpy as np
 
 from robospa.action_space import ActionSpace
-from robospa.harness.datasets.episode import DatasetEpisode, EpisodeFilm, Pictures, Stills
+from robospa.harness.datasets.episode import DatasetEpisode, Pictures
 from robospa.observation import WIDTH
 from robospa.tasks.events import Event
 from robospa.trial import TrialKey
@@ -21,13 +21,13 @@ def fake_episode(
     space = ActionSpace()
     rng = np.random.default_rng(key.seed)
     commanded = rng.normal(size=(frames, space.width)).astype(np.float32)
-    pictures: dict[str, Pictures] = {
-        "head": EpisodeFilm("h264", 8, 6, rng.bytes(200)),
-        "left_wrist": EpisodeFilm("av1", 8, 6, b""),
+    pictures = {
+        "head": Pictures("h264", 8, 6, (rng.bytes(200),)),
+        "left_wrist": Pictures("av1", 8, 6, (b"",)),
     }
     if stills:
         files = tuple(rng.bytes(20 + t) for t in range(frames))
-        pictures = {"head": Stills("jpeg", 8, 6, files), "front": Stills("png", 8, 6, files)}
+        pictures = {"head": Pictures("jpeg", 8, 6, files), "front": Pictures("png", 8, 6, files)}
     return DatasetEpisode(
         key,
         kind,

@@ -9,7 +9,7 @@ import numpy as np
 from dataset_fakes import fake_episode
 from numpy.typing import NDArray
 
-from robospa.harness.datasets.episode import DatasetEpisode, EpisodeFilm, Pictures, episode_bytes
+from robospa.harness.datasets.episode import DatasetEpisode, Pictures, episode_bytes
 from robospa.harness.datasets.manifest import DatasetManifest, SeedFailure
 from robospa.harness.datasets.pack import pack
 from robospa.harness.datasets.pictures import ENCODERS, encode
@@ -45,9 +45,8 @@ def seen_as(codec: str, *cameras: NDArray[np.uint8]) -> dict[str, Pictures]:
 
 def film_of(pictures: NDArray[np.uint8]) -> bytes:
     """An MP4 file of `pictures`."""
-    film = seen_as("h264", pictures)["head"]
-    assert isinstance(film, EpisodeFilm)
-    return film.data
+    (film,) = seen_as("h264", pictures)["head"].files
+    return film
 
 
 def tiny_episode(number: int, codec: str = "h264", frames: int | None = None) -> DatasetEpisode:

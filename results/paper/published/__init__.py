@@ -7,15 +7,13 @@ Tasks have the names of the environments; `PublishedTask.printed` is the name in
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from typing import TypeVar
+from typing import Any
 
 from robospa.registry import did_you_mean
 from robospa.schema import read
-
-T = TypeVar("T")
 
 LEVELS = (1, 2, 3, 4, 5)
 TITLES = {"pi0.5": "π0.5"}
@@ -58,7 +56,7 @@ class PerTask:
     metric: str
     model: str
     rows: Mapping[str, tuple[float, ...]]
-    source: str = ""
+    source: str
 
 
 @dataclass(frozen=True)
@@ -204,70 +202,31 @@ def title(model: str) -> str:
     return TITLES.get(model, model)
 
 
-@dataclass(frozen=True)
-class _TaskRow:
-    printed: str
-    category: str
-    candidates: tuple[int, ...] = ()
-    subtasks: tuple[int, ...] = ()
+TABLES = ("main", "onta", "ps", "intervals", "embodiments", "basic_grounding", "datasets", "assets")
+"""Fields of `Published` that have a file each."""
 
 
-@dataclass(frozen=True)
-class _Tasks:
-    tasks: Mapping[str, _TaskRow]
-
-
-@dataclass(frozen=True)
-class _PerTaskTables:
-    trials: int
-    tables: Mapping[str, PerTask]
-
-
-@dataclass(frozen=True)
-class _Models:
-    source: str
-    suite: str
-    embodiment: str
-    mode: str
-    split: str
-    rows: Mapping[str, PublishedModel]
-
-
-def _content(name: str) -> object:
+def _content(name: str) -> Any:
     return json.loads(files(__name__).joinpath(name).read_text(encoding="utf-8"))
-
-
-def _read(schema: type[T], name: str) -> T:
-    return read(schema, _content(name), name)
 
 
 @cache
 def load() -> Published:
     """The published results; read once."""
-    tasks, models = _read(_Tasks, "tasks.json").tasks, _read(_Models, "models.json")
-    per_task = _read(_PerTaskTables, "per_task.json")
-    return Published(
-        trials=per_task.trials,
-        suite=models.suite,
-        embodiment=models.embodiment,
-        mode=models.mode,
-        split=models.split,
-        models=models.rows,
-        tasks={
-            name: PublishedTask(name, row.printed, row.category, row.candidates or row.subtasks)
-            for name, row in tasks.items()
+    models, per_task = _content("models.json"), _content("per_task.json")
+    whole = {
+        **models,
+        "models": models["rows"],
+        "budget_source": models["source"],
+        "trials": per_task["trials"],
+        "tasks": {
+            name: {**row, "name": name, "counts": row.get("candidates") or row["subtasks"]}
+            for name, row in _content("tasks.json")["tasks"].items()
         },
-        per_task={
-            (table.model, table.metric): replace(table, source=source)
-            for source, table in per_task.tables.items()
+        "per_task": {
+            (table["model"], table["metric"]): {**table, "source": source}
+            for source, table in per_task["tables"].items()
         },
-        main=_read(PrintedTable, "main.json"),
-        onta=_read(PrintedTable, "onta.json"),
-        ps=_read(PrintedTable, "ps.json"),
-        intervals=_read(IntervalTable, "intervals.json"),
-        embodiments=_read(Embodiments, "embodiments.json"),
-        basic_grounding=_read(BasicGrounding, "basic_grounding.json"),
-        datasets=_read(Datasets, "datasets.json"),
-        assets=_read(Assets, "assets.json"),
-        budget_source=models.source,
-    )
+        **{name: _content(f"{name}.json") for name in TABLES},
+    }
+    return read(Published, whole, "the published results")

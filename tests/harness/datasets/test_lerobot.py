@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 from dataset_fakes import fake_episode
 from numpy.typing import NDArray
+from PIL import Image
 from tiny_datasets import CAMERAS, MANIFEST, SIZE, film_of, painted, tiny_dataset, written
 
 from robospa.harness.datasets.episode import (
@@ -20,8 +21,7 @@ from robospa.harness.datasets.episode import (
     HEADER,
     DatasetEpisode,
     EpisodeFileError,
-    EpisodeFilm,
-    Stills,
+    Pictures,
     episode_bytes,
     read_episode_file,
 )
@@ -121,7 +121,7 @@ def test_stills_lie_in_the_rows_as_the_hub_keeps_images(tmp_path: Path) -> None:
     assert about["info"]["features"]["observation.images.head"] == {"_type": "Image"}
     image = file.read_row_group(1)["observation.images.head"].to_pylist()[2]
     seen = episodes[1].pictures["head"]
-    assert image == {"bytes": seen.frames[2], "path": "frame-000002.png"}  # type: ignore[union-attr]
+    assert image == {"bytes": seen.files[2], "path": "frame-000002.png"}
     info = json.loads((tmp_path / "meta/info.json").read_text())
     assert info["features"]["observation.images.head"]["dtype"] == "image"
     assert info["video_path"] is None
@@ -181,10 +181,9 @@ def test_an_episode_has_a_file_and_a_film_a_camera(tmp_path: Path) -> None:
     assert b"huggingface" not in (table.schema.metadata or {})
     for camera in CAMERAS:
         key = f"observation.images.{camera}"
-        film = episodes[1].pictures[camera]
-        assert isinstance(film, EpisodeFilm)
+        (film,) = episodes[1].pictures[camera].files
         path = tmp_path / info["video_path"].format(video_key=key, **where)
-        assert path.read_bytes() == film.data
+        assert path.read_bytes() == film
 
 
 def test_lines_of_tasks_episodes_and_statistics(tmp_path: Path) -> None:
@@ -236,14 +235,10 @@ def test_every_frame_is_there_in_its_colours(codec: str) -> None:
             assert np.abs(frame.mean(axis=(0, 1)) - wanted).max() < 12, (codec, t)
 
 
-def decoded(seen: EpisodeFilm | Stills) -> list[NDArray[np.uint8]]:
-    if isinstance(seen, Stills):
-        from PIL import Image
-
-        return [np.asarray(Image.open(io.BytesIO(data))) for data in seen.frames]
-    import av
-
-    with av.open(io.BytesIO(seen.data)) as file:
+def decoded(seen: Pictures) -> list[NDArray[np.uint8]]:
+    if not seen.filmed:
+        return [np.asarray(Image.open(io.BytesIO(data))) for data in seen.files]
+    with av.open(io.BytesIO(seen.files[0])) as file:
         frames = list(file.decode(video=0))
         assert [round(frame.time * FPS, 6) for frame in frames] == list(range(FRAMES))
         keys = [t for t, frame in enumerate(frames) if frame.key_frame]
@@ -336,8 +331,7 @@ def test_an_episode_whose_arrays_do_not_fit_is_none() -> None:
         replace(episode, sim_time=episode.sim_time[1:])
     with pytest.raises(ValueError, match="camera head has 4 frames, not 5"):
         head = episode.pictures["head"]
-        assert not isinstance(head, EpisodeFilm)
-        replace(episode, pictures={"head": replace(head, frames=head.frames[1:])})
+        replace(episode, pictures={"head": replace(head, files=head.files[1:])})
 
 
 @pytest.mark.parametrize("stills", [False, True])

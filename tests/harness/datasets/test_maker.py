@@ -8,7 +8,7 @@ import pytest
 from fake_runs import trial_record
 from numpy.typing import NDArray
 
-from robospa.harness.datasets.episode import DatasetEpisode, EpisodeFilm, read_episode_file
+from robospa.harness.datasets.episode import DatasetEpisode, read_episode_file
 from robospa.harness.datasets.maker import (
     EpisodeMaker,
     replay_end,
@@ -87,9 +87,8 @@ def test_every_frame_has_a_picture(episode: DatasetEpisode) -> None:
 
     import av
 
-    film = episode.pictures["head"]
-    assert isinstance(film, EpisodeFilm)
-    with av.open(io.BytesIO(film.data)) as file:
+    (film,) = episode.pictures["head"].files
+    with av.open(io.BytesIO(film)) as file:
         times = [frame.time * FPS for frame in file.decode(video=0)]
     assert np.allclose(times, range(len(episode)))
 
