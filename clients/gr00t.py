@@ -31,10 +31,11 @@ from numpy.typing import NDArray
 from robospa.action_space import ActionSpace
 from robospa.clients.chunks import ChunkOptions, as_chunk, invert_grippers, refuse_unread
 from robospa.clients.dialect import Answer, ConnectionParams, Dialect, Probe, StatelessSession
-from robospa.clients.numpy_msgpack import npy_form, pack, unpack
+from robospa.clients.numpy_msgpack import npy_form, unpack
 from robospa.observation import CameraSpec, Observation
 from robospa.protocol import errors
 from robospa.protocol.client import violation
+from robospa.protocol.codec import encode
 from robospa.protocol.options import option
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.transport import connect_until, keep_freed_memory
@@ -77,7 +78,7 @@ class ZeroMq:
         request = {name: value for name, value in said.items() if value is not None}
         if self._context.closed:
             raise errors.ConnectionLost(f"the connection to {self.url} was closed after an error")
-        self._socket.send(pack(request, npy_form, self._limits), copy=False)
+        self._socket.send(encode(request, self._limits, npy_form), copy=False)
         answer = self._receive(endpoint, timeout)
         if answer == b"ERROR":  # all that very old versions say
             raise errors.ServerError("an error", "no reason given", True, self.url)

@@ -7,29 +7,26 @@
     openpi   {b"__ndarray__": true, b"data": bytes, b"dtype": "<f4", b"shape": [..]}
                                              (read here, written by `robospa.protocol.codec`)
 
-Reading understands all. Plain numbers only: object, structured and complex arrays are refused, and
-extension types too, so nothing that comes over the wire is ever executed.
+`robospa.protocol.codec.encode` writes any of them; reading understands all. Plain numbers only:
+object, structured and complex arrays are refused, and extension types too, so nothing that comes
+over the wire is ever executed.
 """
 
 import io
 import re
-from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-import msgpack
 import numpy as np
 from numpy.typing import NDArray
 
 from robospa.clients.chunks import plain_dtype
 from robospa.clients.dialect import ConnectionParams
 from robospa.protocol.client import violation
-from robospa.protocol.codec import Limits, Reader, decode
-from robospa.protocol.errors import DecodeError, EncodeError, TransportError, printable
+from robospa.protocol.codec import Form, Limits, Reader, decode, encode
+from robospa.protocol.errors import DecodeError, TransportError, printable
 from robospa.protocol.transport import Transport
 
-Form = Callable[[NDArray[Any]], dict[object, object]]
-KINDS = "biuf"
 NPY = re.compile(
     rb"\x93NUMPY(?:\x01\x00..|\x02\x00....)"
     rb"\{'descr': '([^']*)', 'fortran_order': (True|False), 'shape': \(([0-9, ]*)\), \} *\n",
@@ -85,25 +82,6 @@ def read_npy(data: object) -> NDArray[Any]:
     if fortran == "True":
         return _build(dtype, shape[::-1], rows).T
     return _build(dtype, shape, rows)
-
-
-def pack(value: object, form: Form, limits: Limits) -> bytes:
-    """One message; raises EncodeError."""
-
-    def default(item: object) -> object:
-        if isinstance(item, np.ndarray) and item.dtype.kind in KINDS:
-            return form(item)
-        if isinstance(item, np.generic) and item.dtype.kind in KINDS:
-            return item.item()
-        raise TypeError(f"{type(item).__name__} cannot be sent")
-
-    try:
-        data: bytes = msgpack.packb(value, default=default, use_bin_type=True)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise EncodeError(f"cannot encode a message: {error}") from error
-    if len(data) > limits.message:
-        raise EncodeError(f"message of {len(data)} bytes is over the limit of {limits.message}")
-    return data
 
 
 class _AnyForm(Reader):
@@ -179,7 +157,7 @@ class MsgpackSocket:
 
     def send(self, message: dict[str, object]) -> None:
         """Raises EncodeError and ConnectionLost."""
-        self._transport.send(pack(message, self._form, self._limits))
+        self._transport.send(encode(message, self._limits, self._form))
 
     def receive(self, timeout: float, what: str) -> dict[str, object]:
         """The next message; raises CallTimeout, ConnectionLost, ProtocolViolation."""

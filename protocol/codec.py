@@ -1,9 +1,9 @@
 """Values to bytes and back: msgpack, with numpy arrays as raw bytes, dtype and shape.
 
 An array is a map with the four binary keys `__ndarray__` (true), `data`, `dtype`, `shape`: the
-layout of openpi, so one codec serves both dialects. Encoding copies each array once, into the
-final buffer; decoding copies none (arrays are read-only views of the received bytes; only
-multi-byte items at an odd address are copied, so that every array is aligned).
+layout of openpi, so one codec serves both dialects. Decoding copies none (arrays are read-only
+views of the received bytes; only multi-byte items at an odd address are copied, so that every array
+is aligned).
 
 Refused, with EncodeError or DecodeError: object, string, structured and complex dtypes (there is
 no pickle here), extension types, repeated keys, anything beyond `Limits`. All lengths are compared
@@ -62,115 +62,74 @@ _BINARY_KEYS = _ARRAY_KEYS | _SCALAR_KEYS
 
 # ---------------------------------------------------------------- encoding
 
+Form = Callable[[NDArray[Any]], dict[Any, object]]
+"""An array as the map that stands for it in a message."""
 
-def encode(value: object, limits: Limits = DEFAULT_LIMITS) -> bytes:
+
+def array_map(array: NDArray[Any]) -> dict[Any, object]:
+    """An array in the layout of openpi; its bytes stay where they are."""
+    name = array.dtype.newbyteorder("<").str
+    flat = np.ascontiguousarray(array, dtype=DTYPES[name]).reshape(-1)
+    return {_MARK: True, _DTYPE: name, _SHAPE: array.shape, _DATA: flat.view(np.uint8).data}
+
+
+def encode(value: object, limits: Limits = DEFAULT_LIMITS, form: Form = array_map) -> bytes:
     """One contiguous message from None, bool, int, float, str, bytes, lists, maps and arrays.
 
-    Tuples become lists and numpy scalars become Python numbers. Raises EncodeError.
+    Tuples become lists and numpy scalars become Python numbers; `form`: of arrays. Raises
+    EncodeError.
     """
-    writer = _Writer(limits)
+
+    def plain(item: Any) -> object:
+        """What msgpack does not know by itself."""
+        if isinstance(item, np.ndarray):
+            return form(item)
+        if isinstance(item, int):
+            raise OverflowError(f"{item} has more than 64 bits")
+        return dict(item) if isinstance(item, Mapping) else item.item()
+
     try:
-        writer.value(value, 0)
+        _check(value, limits)
+        data: bytes = msgpack.packb(value, default=plain, use_bin_type=True)
     except (TypeError, ValueError, OverflowError) as error:
         raise EncodeError(f"cannot encode a value: {error}") from error
-    if writer.size > limits.message:
-        raise EncodeError(f"message of {writer.size} bytes is over the limit of {limits.message}")
-    return b"".join(writer.parts)
+    if len(data) > limits.message:
+        raise EncodeError(f"message of {len(data)} bytes is over the limit of {limits.message}")
+    return data
 
 
-class _Writer:
-    """Collects the parts of a message; arrays stay where they are until the final join."""
-
-    def __init__(self, limits: Limits) -> None:
-        self.limits = limits
-        self.parts: list[Buffer] = []
-        self.size = 0
-        self.items = 0
-        self.packer = msgpack.Packer(use_bin_type=True)
-
-    def add(self, part: Buffer, size: int) -> None:
-        self.parts.append(part)
-        self.size += size
-
-    def value(self, value: object, depth: int) -> None:
-        self.items += 1
-        if depth > self.limits.depth or self.items > self.limits.items:
-            raise EncodeError(
-                f"a message may have {self.limits.depth} levels and {self.limits.items} items"
-            )
+def _check(value: object, limits: Limits) -> None:
+    """Raises EncodeError for what cannot be sent, before anything is written."""
+    items, left = 0, [(value, 0)]
+    while left:
+        value, depth = left.pop()
+        items += 1
+        if depth > limits.depth or items > limits.items:
+            raise EncodeError(f"a message may have {limits.depth} levels and {limits.items} items")
         if isinstance(value, np.ndarray):
-            self.array(value)
+            if value.dtype.newbyteorder("<").str not in DTYPES:
+                known = list(DTYPES)
+                raise EncodeError(f"array of dtype {value.dtype} cannot be sent, only {known}")
+            if value.nbytes > limits.array or value.ndim > limits.ndim:
+                raise EncodeError(
+                    f"array of shape {value.shape} ({value.nbytes} bytes) is over a limit"
+                )
+            items += 7 + value.ndim
         elif isinstance(value, Mapping):
-            self.map(value, depth)
-        elif isinstance(value, (list, tuple)):
-            header = self.packer.pack_array_header(len(value))
-            self.add(header, len(header))
-            for item in value:
-                self.value(item, depth + 1)
-        else:
-            self.leaf(value)
-
-    def map(self, value: Mapping[object, object], depth: int) -> None:
-        header = self.packer.pack_map_header(len(value))
-        self.add(header, len(header))
-        for key, item in value.items():
-            if type(key) is not str and type(key) is not int:
-                raise EncodeError(f"map key {key!r} is neither a string nor an integer")
-            self.items += 1
-            self.leaf(key)
-            self.value(item, depth + 1)
-
-    def leaf(self, value: object) -> None:
-        if isinstance(value, np.generic):
+            for key in value:
+                if type(key) is not str and type(key) is not int:
+                    raise EncodeError(f"map key {key!r} is neither a string nor an integer")
+            left += ((one, depth + 1) for one in (*value, *value.values()))
+        elif isinstance(value, list | tuple):
+            left += ((one, depth + 1) for one in value)
+        elif isinstance(value, np.generic):
             if value.dtype.kind not in "biuf":
                 raise EncodeError(f"numpy scalar of dtype {value.dtype} cannot be sent")
-            value = value.item()
-        if value is not None and not isinstance(value, (bool, int, float, str, bytes, bytearray)):
+        elif isinstance(value, str):
+            if len(value.encode()) > limits.text:
+                raise EncodeError(f"text of {len(value)} characters is over the limit")
+        elif value is not None and not isinstance(value, bool | int | float | bytes | bytearray):
             raise EncodeError(f"a value of type {type(value).__name__} cannot be sent")
-        packed = self.packer.pack(value)
-        if isinstance(value, str) and len(packed) > self.limits.text:
-            raise EncodeError(f"text of {len(value)} characters is over the limit")
-        self.add(packed, len(packed))
-
-    def array(self, array: NDArray[np.generic]) -> None:
-        name = array.dtype.newbyteorder("<").str
-        if name not in DTYPES:
-            raise EncodeError(f"array of dtype {array.dtype} cannot be sent, only {list(DTYPES)}")
-        if array.nbytes > self.limits.array or array.ndim > self.limits.ndim:
-            raise EncodeError(
-                f"array of shape {array.shape} ({array.nbytes} bytes) is over a limit"
-            )
-        self.items += 7 + array.ndim
-        flat = np.ascontiguousarray(array, dtype=DTYPES[name]).reshape(-1)
-        pack = self.packer.pack
-        head = b"".join(
-            (
-                _ARRAY_HEAD,
-                pack(name),
-                _SHAPE_KEY,
-                pack(array.shape),
-                _DATA_KEY,
-                _bin_header(array.nbytes),
-            )
-        )
-        self.add(head, len(head))
-        self.add(flat.view(np.uint8).data if flat.size else b"", array.nbytes)
-
-
-def _bin_header(size: int) -> bytes:
-    if size < 2**8:
-        return struct.pack(">BB", 0xC4, size)
-    if size < 2**16:
-        return struct.pack(">BH", 0xC5, size)
-    return struct.pack(">BI", 0xC6, size)
-
-
-def _binary(key: bytes) -> bytes:
-    return _bin_header(len(key)) + key
-
-
-_ARRAY_HEAD = b"\x84" + _binary(_MARK) + b"\xc3" + _binary(_DTYPE)
-_SHAPE_KEY, _DATA_KEY = _binary(_SHAPE), _binary(_DATA)
 
 
 # ---------------------------------------------------------------- decoding

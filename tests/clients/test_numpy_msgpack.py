@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robospa.clients.numpy_msgpack import binary_form, pack, text_form, unpack
-from robospa.protocol.codec import DEFAULT_LIMITS
+from robospa.clients.numpy_msgpack import binary_form, text_form, unpack
+from robospa.protocol.codec import DEFAULT_LIMITS, encode
 from robospa.protocol.errors import DecodeError
 
 
@@ -25,7 +25,7 @@ def test_noise_raises_nothing_else(data: bytes) -> None:
 @pytest.mark.parametrize("form", [binary_form, text_form])
 def test_arrays_come_back(form: Any) -> None:
     sent = np.arange(6, dtype=np.float32).reshape(2, 3)
-    assert np.array_equal(unpack(pack([sent], form, DEFAULT_LIMITS), DEFAULT_LIMITS)[0], sent)
+    assert np.array_equal(unpack(encode([sent], form=form), DEFAULT_LIMITS)[0], sent)
 
 
 @pytest.mark.parametrize(
