@@ -199,7 +199,7 @@ class ChunkOptions(RobotOption):
     """How many actions a chunk has, and how many of them are executed."""
 
     horizon: Annotated[int, Meta(ge=1, le=MAX_HORIZON)] | None = option(
-        None, "actions in a chunk, at most; none for as many as come"
+        None, "the most actions in a chunk; none for any number"
     )
     execute: Count | None = option(None, "actions executed before the next query; none for all")
 

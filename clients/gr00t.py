@@ -168,7 +168,7 @@ class Gr00tClientOptions(ChunkOptions):
     )
     deltas: str = option(
         "refuse",
-        "`add`: actions that the server declares as DELTA are added up, from the joints sent on",
+        "`add`: actions declared as DELTA are added up, starting from the joints sent",
         ("refuse", "add"),
     )
     state: str = option("commanded", "which joints to send", ("commanded", "measured"))

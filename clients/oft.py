@@ -45,8 +45,8 @@ class OftClientOptions(ChunkOptions):
     state: str = option("commanded", "which joints to send", ("commanded", "measured"))
     actions: str = option(
         "absolute",
-        "`relative`: each action is added to the target before it, the first of a trial to the "
-        "joints at its start, as with use_relative_actions",
+        "`relative`: each action is added to the previous target, the first to the joints at the "
+        "trial's start, as with use_relative_actions",
         ("absolute", "relative"),
     )
 

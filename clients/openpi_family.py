@@ -62,40 +62,40 @@ class FamilyOptions(ChunkOptions):
     )
     text_budget: Count | None = option(
         150,
-        "tokens that the model keeps of an instruction: pi0.5 has 200 for it and the state "
-        "together, pi0 has 48",
+        "tokens of an instruction that the model keeps: pi0.5 has 200 for text and state together, "
+        "pi0 has 48",
     )
     committed: str = option(
         "",
-        "for real-time chunking: the server's names of the committed actions and the delay, such "
-        "as prev_chunk_left_over,inference_delay; empty: not sent",
+        "for real-time chunking: the server's names for committed actions and delay, such as "
+        "prev_chunk_left_over,inference_delay; empty: not sent",
     )
     extra: str = option("{}", "JSON map sent with every observation")
-    inside: str = option("", "where the observation goes in a message, such as examples/0")
+    inside: str = option("", "path of the observation in a message, such as examples/0")
     images: str = option("images", "name of the pictures: a map; with [] a list; empty: one by one")
     layout: str = option("chw", "axes of a picture, uint8 RGB", ("chw", "hwc"))
     size: Count | None = option(None, "side of the square to which pictures are shrunk by area")
     joints: str = option("state", "name of the joints; with [] as (1, D); empty: not sent")
     text: str = option("prompt", "name of the instruction")
-    actions: str = option("actions", "where an answer has the actions; empty: it is the actions")
+    actions: str = option("actions", "path of the actions in an answer; empty: the answer itself")
     order: tuple[int, ...] = option(
         (),
-        "in a file, as [0, 1, 2]: the server's column of each of our numbers, in joints too",
+        "in a file, as [0, 1, 2]: the server's column for each of ours, in joints too",
     )
     deltas: str = option(
         "none",
-        "what an action is a change of: `last`, the target before it, from the joints at the "
-        "trial's start on (StarVLA's action_mode delta); `start`, those joints (rel)",
+        "what actions are added to: `last`, the previous target, at first the joints at the "
+        "trial's start (StarVLA's action_mode delta); `start`, always those joints (rel)",
         ("none", "last", "start"),
     )
-    reset: str = option("{}", "JSON map sent when a trial begins, which is answered; {}: none")
+    reset: str = option("{}", "JSON map sent when a trial begins, and answered; {}: none")
     connection: str = option(
         "run",
-        "`trial`: a connection for every trial, for a policy that begins anew with one",
+        "`trial`: a new connection for every trial, for a policy that starts afresh with it",
         ("run", "trial"),
     )
     idle: Annotated[float, Meta(ge=0)] = option(
-        0.0, "seconds after which an idle connection is made anew; 0: never"
+        0.0, "seconds after which an idle connection is replaced; 0: never"
     )
 
     def __post_init__(self) -> None:

@@ -173,12 +173,12 @@ class RoboTwinClientOptions(AnyModelOptions):
     calls: str = option(
         "ask",
         "`ask`: get_action(observation); `update`: update_obs(observation), then get_action(); "
-        "`both`: update_obs(observation), but not at the first query, then get_action(observation)",
+        "`both`: update_obs(observation), except at the first query, then get_action(observation)",
         ("ask", "update", "both"),
     )
     reset: str = option("reset_model", "method called at the start of a trial; none for no call")
     history: Annotated[int, Meta(ge=0, le=64)] = option(
-        0, "earlier steps, one action apart, given to update_obs before asking"
+        0, "earlier steps, one action apart, given to update_obs before a query"
     )
 
     def __post_init__(self) -> None:

@@ -55,8 +55,7 @@ class VlaEvalClientOptions(AnyModelOptions):
     state_keys: str = option("joint_state", "names under which the joints are sent")
     execute: Count | None = option(
         1,
-        "actions executed before the next query; none for all, where vla-eval's own runner "
-        "executes the first alone",
+        "actions executed before the next query; none for all. vla-eval's own runner executes one",
     )
 
     def __post_init__(self) -> None:
