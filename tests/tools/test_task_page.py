@@ -51,9 +51,17 @@ def test_values_of_five_levels_in_words(values: list[int], text: str) -> None:
 
 
 def test_a_row_says_the_limits_of_all_levels() -> None:
-    rates = {"hold": "0/0/20"}
-    line = task_page.row(tasks()["Click_Can_Place_Items"], True, rates, ["hold", "other"])
-    assert "T 1 to 5<br>limit 200 to 1000" in line and line.endswith("| 0/0/20 | - |")
+    can, bread = tasks()["Click_Can_Place_Items"], tasks()["Place_Bottle_Cup"]
+    rates = {can.name: {"hold": "0/0/20", "other": "0/0/0"}}
+    *_, heads, _, first, second = task_page.table([can, bread, can], rates)[:-1]
+    assert heads.endswith("| hold |")
+    assert first.endswith("| 0/0/20 |") and second.endswith("| - |")
+
+
+def test_what_all_tasks_but_one_share_stands_above_the_table() -> None:
+    presses, bells = tasks()["Press_Stapler_Memory"], tasks()["Click_Bell_Repeat"]
+    line, *_ = task_page.table([presses, presses, bells], {})
+    assert line.startswith("Levels: n, T 1 to 5; limit 200 to 1000. Click_Bell_Repeat: n 1")
 
 
 # ---- the table of every task's rates holds several runs, and progress beside that of doing nothing
