@@ -47,10 +47,11 @@ and {last}; `robospa tasks NAME --level 3 --seed 100007` shows any other scene.
 | `a to b` | rises from level 1 to 5 in equal steps |
 | 100/17 | SR/SR@1 in percent; in procedures SR/SR@1/PS |
 | learned | [the learned reference](learned.md) |
-| other policies | they [read no sentence](policies.md#floors); levels 1, 3, 5; PS of *doing nothing* |
+| others | [read no sentence](policies.md#floors); levels 1, 3, 5; *doing nothing*: PS |
 
 Trials per task: {extents}.
-Columns with only zeros or no data are left out. The expert has 100 everywhere{but}. Where a policy that reads no sentence has 100, [the official rule asks for
+Columns with only zeros or no data are left out. The expert has 100 everywhere{but}.
+Where a policy that reads no sentence has 100, [the official rule asks for
 none](fidelity.md#what-the-official-rule-allows).
 """
 
