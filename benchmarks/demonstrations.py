@@ -96,8 +96,8 @@ def demonstrations(
         "Demonstrations",
         list(_overall(variants)),
         text="""\
-An action is a recorded frame after the first; how many physics steps lie between two frames is data
-of each task. All variants are in `benchmarks/results/demonstrations.csv`.""",
+An action is a recorded frame after the first; each task sets how many physics steps lie between two
+frames. All variants are in `benchmarks/results/demonstrations.csv`.""",
         files={TABLE: _table(variants)},
     )
 
@@ -192,13 +192,13 @@ def collecting() -> Result:
         each = seconds[category] / len(some)
         count, size = (mean(getattr(row, name) for row in some) for name in ("frames", "size"))
         note = f"{count:.0f} frames, {size / 1e3:.0f} kB"
-        figures.append(Figure(f"{category}: an episode", round(each, 1), "s", note=note))
+        figures.append(Figure(f"{category} episode", round(each, 1), "s", note=note))
     return Result(
         "Collecting demonstrations",
         figures,
         text="""\
-Processor time of one worker that had made an episode before. What goes to pictures is drawing and
-encoding them; it does not depend on their number of pixels, but on what is in them.""",
+Processor time of one worker after its first episode. *Pictures* are drawn and encoded; their cost
+depends on what they show, not on their number of pixels.""",
     )
 
 

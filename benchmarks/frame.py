@@ -41,10 +41,10 @@ ORDER = ["wire", "step", "batching", "physics", "rendering", "throughput", "para
 """The page's order; what is not named comes after, by name."""
 HEAD = """# Benchmarks
 
-What "good" means in numbers, each beside a bare limit or a peer measured in the same run.
-`python benchmarks/NAME.py --json` measures again, keeps the result in `benchmarks/results/` and
-writes this page. All figures are from two x86-64 cores without a GPU, Python 3.11, numpy 2.4,
-SAPIEN 3.0.3, websockets 17.4; *load* is the machine's during a measurement.
+Each figure stands beside a bare limit or a peer measured in the same run. `python
+benchmarks/NAME.py --json` measures again, keeps the result in `benchmarks/results/` and writes this
+page. All figures are from two x86-64 cores without a GPU, with Python 3.11, numpy 2.4, SAPIEN 3.0.3
+and websockets 17.4; *load* is the machine's load average after a measurement.
 """
 Json = dict[str, Any]
 
@@ -241,7 +241,7 @@ def page(results: Sequence[Json]) -> str:
 
 def section(result: Json) -> str:
     """One measurement: its text, its table, its command."""
-    lines = ["| what | measured | bar | note |", "| --- | --- | --- | --- |"]
+    lines = ["| what | measured | bar | note |", "|---|---|---|---|"]
     for figure in figures(result):
         verdict = {True: "met", False: "**not met**", None: ""}[figure.met]
         source = f"`{figure.command}`" if figure.command else ""

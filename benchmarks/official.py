@@ -105,9 +105,9 @@ def measure(assets: str = "", trials: int = 20) -> Result:
         "Objects of the official archive",
         figures,
         text="""\
-With `--world official` objects are those of an archive ([the official world](official-world.md)):
-here a made-up one of the official names, sizes and frames, whose meshes are smaller than the real
-ones. What is drawn and what collides is made of its files once and kept; loading reads that.""",
+`--world official` takes objects from an archive ([the official world](official-world.md)): here
+from a made-up one with the official names, sizes and frames, but smaller meshes. Visual and
+collision models are made from its files once and kept; loading reads these.""",
         circumstances=f"{len(times)} variants loaded once with a renderer, models from the cache "
         f"on disk; {len(keys)} trials at level 5; CPU time",
     )

@@ -140,9 +140,9 @@ def measure(blocks: int = 8, actions: int = 40, rounds: int = 5) -> Result:
         "Physics in the trial loop",
         figures,
         text="""\
-Both sides write the same drive targets, all joints of both arms, in the same steps. The trial loop
-adds reading the action, its trajectory, and a snapshot 50 times a simulated second for a goal that
-looks at every object's height.""",
+Both sides write the same drive targets for all joints of both arms in the same steps. The trial
+loop also reads the action, computes its trajectory, and takes 50 snapshots a simulated second for a
+goal that looks at every object's height.""",
         circumstances=f"{blocks} blocks, {steps} steps, fastest of {rounds} rounds, CPU time",
     )
 

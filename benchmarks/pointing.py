@@ -66,9 +66,9 @@ def measure(trials: int = 62) -> Result:
             Figure("processor time of a question", round(1e3 * busy / count, 1), "ms"),
         ],
         text="""\
-A question is a scene that is drawn anew from its seed, brought to rest and drawn twice: as the
-model sees it, and with the number of each pixel's object. The layouts that the scenes of a variant
-are drawn from are made once in a process and are a part of the figures.""",
+For every question a scene is drawn from its seed, brought to rest and rendered twice: as the model
+sees it, and with the number of each pixel's object. The figures include the layouts of a variant's
+scenes, which are made once in a process.""",
     )
 
 

@@ -158,13 +158,13 @@ def measure(rounds: int = 15) -> Result:
         "Observations",
         figures,
         text="""\
-Only the cameras that a policy asks for are rendered, and only when it is asked for actions. Bare
-capture takes pictures of the same scene with SAPIEN's calls and default shader. Ours is one pass
-without what these scenes have none of, with three shadow maps that leave wall and floor out, and
-bytes instead of floats; on a CPU SAPIEN draws all cameras side by side as one. Edges are smoothed
-from the pixels for 0.9 ms (35 to 44 dB of a 16-fold supersampled picture before, 37 to 47 after);
-four samples a pixel added 12.8 ms, as much again. Small triangles that are seen are dear: those of
-a randomised scene's ten more things take 4.6 ms, the things themselves 1.4, its textures 1.3.""",
+Only the cameras that a policy asks for are rendered, and only when it is queried. Bare capture
+renders the same scene with SAPIEN's calls and default shader. Ours makes one pass without effects
+that these scenes do not have, with three shadow maps that exclude wall and floor, and returns bytes
+instead of floats; on a CPU it draws all cameras side by side as one. Edges are smoothed from the
+pixels in 0.9 ms (from 35 to 44 dB against a 16-fold supersampled picture to 37 to 47); four samples
+a pixel added 12.8 ms, doubling the time. Small visible triangles are expensive: in a randomised
+scene those of the ten extra objects take 4.6 ms, the objects themselves 1.4, textures 1.3.""",
         circumstances=f"medians of {rounds} rounds; sides take turns; drawn by {renderer['name']}, "
         f"{renderer['version']}",
     )

@@ -199,8 +199,8 @@ def measure(rounds: int = 6) -> Result:
         "What a step costs beside its physics",
         figures,
         text="""\
-With chunks of 50 actions the harness asks once in 50 steps and renders only then. A buffered step
-is everything between two calls of the simulator. vla-eval keeps chunks on its server: every step
+With chunks of 50 actions the harness queries and renders once in 50 steps. A buffered step is
+everything between two calls of the simulator. vla-eval keeps chunks on its server, so every step
 renders, encodes, sends and waits.""",
         circumstances=f"{running.source}; sides take turns",
         versions=wire.versions(PEERS),

@@ -192,10 +192,10 @@ def measure(workers: int = 8, held: int = HELD, seconds: float = 8.0) -> Result:
         "A run against a slow model",
         figures,
         text=f"""\
-The model takes 100 ms and 2 ms a sample, at most 8 at once; a trial takes {CALLS} answers. Driver,
-workers, wire, server and batching are the real ones; the simulation is a busy loop, so that either
-side can be made the scarcer one. A worker holds {held} trials at once: one computes, or is loaded,
-while the others wait for answers.""",
+The model takes 100 ms plus 2 ms a sample, with at most 8 samples a call; a trial needs {CALLS}
+answers. Driver, workers, wire, server and batching are real; the simulation is a busy loop, so that
+either side can be the bottleneck. A worker holds {held} trials at once: one computes or loads while
+the others wait for answers.""",
     )
 
 

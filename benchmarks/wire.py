@@ -47,7 +47,7 @@ REQUIREMENTS: Mapping[str, tuple[str, ...]] = {
 SIDES = {
     "bare": "bare websockets",
     "robospa": "ours",
-    "openpi": "openpi-client, server of openpi's form",
+    "openpi": "openpi-client, openpi-like server",
     "vla-eval raw": "vla-eval, raw images",
     "vla-eval": "vla-eval as shipped (PNG)",
     "xpolicylab": "XPolicyLab's wire form",
@@ -240,7 +240,7 @@ def beside_peers(name: str, times: Times, rates: Mapping[str, float]) -> Iterato
         {kind: float(np.percentile(values, p)) for kind, values in times.items()} for p in (50, 99)
     )
     for kind in (kind for kind in SIDES if kind != "robospa"):
-        what, bar = f"round trip beside {SIDES[kind]}, {name}", 1.25 if kind == "bare" else 1.0
+        what, bar = f"beside {SIDES[kind]}, {name}", 1.25 if kind == "bare" else 1.0
         if kind not in median:
             yield Figure(what, None, "x", at_most=bar, note=problem_of(kind))
             continue
@@ -263,11 +263,11 @@ def round_trips(requests: int = 300, rounds: int = 6) -> Result:
         "What a round trip costs",
         [*beside_peers("1 client", single, {}), *crowded],
         text="""\
-One request is a full observation: three 240x320x3 frames, 30 floats, 20 words; the answer is 50x14
-float32. Bare websockets moves the same bytes and reads nothing. vla-eval's default encodes every
-frame as PNG; raw images exist only as a Python call in its benchmark process. XPolicyLab's client
-and server are in no package: its row is a client and a server that send what its own send, with the
-same libraries, compression included. Notes have our median and theirs.""",
+A request is a full observation: three 240x320x3 frames, 30 floats and 20 words; the answer is 50x14
+float32. The figure is our median over the peer's; notes have both medians. Bare websockets moves
+the same bytes and reads nothing. vla-eval encodes every frame as PNG by default; raw images exist
+only as a Python call in its benchmark process. XPolicyLab's client and server are in no package: a
+client and a server of ours send the same messages with the same libraries and compression.""",
         circumstances=f"{running.source}; sides take turns",
         versions=versions(SIDES),
     )
@@ -292,7 +292,7 @@ def batching(requests: int = 120, rounds: int = 2) -> Result:
             running.close()
     figures = []
     for kind in kinds:
-        what = f"{SIDES[kind]}: share of a full batch, {MANY} clients, a 50 ms model"
+        what = f"{SIDES[kind]}: share of a full batch"
         if kind not in usable:
             figures.append(Figure(what, None, note=problem_of(kind)))
             continue
@@ -310,8 +310,8 @@ def batching(requests: int = 120, rounds: int = 2) -> Result:
         "How full batches get",
         figures,
         text="""\
-The limit is 160 requests/s: eight every 50 ms. A server that starts too early runs batches that are
-not full, one that waits too long leaves the model idle.""",
+Eight clients ask a model that takes 50 ms, so the limit is 160 requests/s. A server that starts
+early runs batches that are not full; one that waits too long leaves the model idle.""",
         circumstances=f"{running.source}; {rounds} rounds, sides take turns",
         versions=versions(kinds.values()),
     )
