@@ -114,7 +114,7 @@ def table(members: Sequence[Task], rates: Rates) -> list[str]:
         if any(set(cell) - set("0/-") for cell in cells):
             columns.append((policy, cells))
     heads = ["task", *(head for head, _ in columns)]
-    lines += [f"| | {' | '.join(heads)} |", "|---" * (1 + len(heads)) + "|"]
+    lines += [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     return lines + [row(task, [of[i] for _, of in columns]) for i, task in enumerate(members)]
 
 
@@ -141,8 +141,8 @@ def per_task(task: Task) -> str:
 def row(task: Task, cells: Sequence[str]) -> str:
     """The line of one task: its picture, what is to be done, and `cells`."""
     picture = f"{PICTURES.relative_to(PAGE.parent).as_posix()}/{picture_name(task)}"
-    all_cells = (f"![{task.name}]({picture})", f"**{task.name}**<br>{task.summary}", *cells)
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in all_cells) + " |"
+    first = f"![{task.name}]({picture})<br>**{task.name}**<br>{task.summary}"
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in (first, *cells)) + " |"
 
 
 def picture_name(task: Task) -> str:
