@@ -24,8 +24,9 @@ SERVED = {
     "diffusion": "robospa.clients.lerobot:create",
     "xvla": "robospa.clients.lerobot:create",
     "pi05": "tiny:serve_pi05",
+    "smolvla": "robospa.clients.lerobot:create",
 }
-SIZES = {"xvla": 856_344, "pi05": 455_520}
+SIZES = {"xvla": 856_344, "pi05": 455_520, "smolvla": 376_928}
 """Parameters, where they are known: another number is another model."""
 
 pytestmark = [pytest.mark.models, pytest.mark.timeout(1500)]

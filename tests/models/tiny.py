@@ -30,6 +30,11 @@ from robospa.protocol.conformance import synthetic_observation
 from robospa.protocol.policy import TrialInfo
 
 VIEWS = ("head_camera", "left_camera", "right_camera")
+BASE_VIEWS = {
+    "xvla": ("image", "image2", "image3"),
+    "smolvla": ("camera1", "camera2", "camera3"),
+}
+"""What the published bases call their cameras."""
 WORDS = "Pick up the largest cube."
 
 
@@ -154,7 +159,7 @@ def xvla(folder: Path) -> Any:
     }
     return XVLAPolicy(
         XVLAConfig(
-            **features(20, (224, 224)),
+            **features(20, (224, 224), BASE_VIEWS["xvla"]),
             florence_config={"vision_config": vision, "text_config": text, "image_token_id": 300},
             tokenizer_name=tokenizer(folder / "tokenizer"),
             tokenizer_max_length=50,
@@ -221,7 +226,60 @@ def pi05(folder: Path) -> Any:
     )
 
 
-MAKERS = {"act": act, "xvla": xvla, "pi05": pi05, "diffusion": diffusion}
+def smolvla(folder: Path) -> Any:
+    """SmolVLA without patches: LeRobot takes its language model's sizes from a folder."""
+    from lerobot.policies.smolvla.configuration_smolvla import SmolVLAConfig
+    from lerobot.policies.smolvla.modeling_smolvla import SmolVLAPolicy
+    from transformers import (
+        AutoTokenizer,
+        SmolVLMConfig,
+        SmolVLMImageProcessor,
+        SmolVLMProcessor,
+        SmolVLMVideoProcessor,
+    )
+
+    language = folder / "language"
+    tokenizer(language)
+    words = AutoTokenizer.from_pretrained(
+        str(language),
+        extra_special_tokens={
+            "image_token": "<image>",
+            "fake_image_token": "<fake_token_around_image>",
+            "global_image_token": "<global-img>",
+            "end_of_utterance_token": "<end_of_utterance>",
+        },
+    )
+    side = {"hidden_size": 64, "intermediate_size": 128, "num_hidden_layers": 2}
+    SmolVLMConfig(
+        vision_config={**side, "num_attention_heads": 2, "image_size": 64, "patch_size": 16},
+        text_config={
+            **side,
+            "model_type": "llama",
+            "num_attention_heads": 4,
+            "num_key_value_heads": 2,
+            "head_dim": 16,
+            "vocab_size": 512,
+        },
+        scale_factor=2,
+    ).save_pretrained(str(language))
+    SmolVLMProcessor(SmolVLMImageProcessor(), words, SmolVLMVideoProcessor()).save_pretrained(
+        str(language)
+    )
+    return SmolVLAPolicy(
+        SmolVLAConfig(
+            **features(14, (240, 320), BASE_VIEWS["smolvla"]),
+            vlm_model_name=str(language),
+            resize_imgs_with_padding=(64, 64),
+            num_vlm_layers=2,
+            chunk_size=10,
+            n_action_steps=10,
+            num_steps=2,
+            device="cpu",
+        )
+    )
+
+
+MAKERS = {"act": act, "xvla": xvla, "pi05": pi05, "diffusion": diffusion, "smolvla": smolvla}
 
 
 def make(name: str, where: str) -> None:
