@@ -18,6 +18,11 @@ SMALL_ACT = {
     "n_vae_encoder_layers": 1,
     "pretrained_backbone_weights": "null",
 }
+CAMERAS = {
+    "smolvla": ["camera1", "camera2", "camera3"],
+    "xvla": ["image", "image2", "image3"],
+}
+"""As the published bases call them."""
 WORDS = {
     "act": SMALL_ACT,
     "smolvla": {},
@@ -49,7 +54,7 @@ pytestmark = [pytest.mark.models, pytest.mark.timeout(1800)]
 def test_a_row_is_made_to_its_report(model: str, tmp_path: Path) -> None:
     base, lerobot, out = (tmp_path / name for name in ("base", "lerobot", "row"))
     if model != "act":
-        ran(HERE / "tiny.py", "make", model, base)
+        ran(HERE / "tiny.py", "make", model, base, *CAMERAS.get(model, ()))
     else:
         base.mkdir()
     (lerobot / "bin").mkdir(parents=True)

@@ -18,6 +18,7 @@ from outside import HERE, PATIENT, ran, served
 from robospa.clients import connect
 from robospa.protocol.conformance import synthetic_observation
 from robospa.protocol.policy import TrialInfo
+from robospa.results.records.runs import read_run
 
 SERVED = {
     "act": "robospa.clients.lerobot:create",
@@ -105,11 +106,9 @@ def test_one_full_trial_in_the_simulator(model: tuple[str, Path], url: str, tmp_
         timeout=1400,
     )
     assert done.returncode == 0, done.stdout + done.stderr
-    files = sorted((out / "trials").iterdir())
-    records = [json.loads(line) for f in files for line in f.read_text().splitlines()]
-    assert len(records) == 1
-    print(model[0], {k: records[0].get(k) for k in ("end", "steps", "policy_calls", "wall_time")})
-    assert records[0]["end"] in ("step_limit", "success")
+    (record,) = read_run(out).records.values()
+    print(model[0], record.end, record.steps, record.policy_calls, record.wall_time)
+    assert record.end in ("step_limit", "success")
     (trace,) = (out / "actions").glob("*.npz")
     with np.load(trace) as data:
         assert np.isfinite(data["actions"]).all() and len(data["actions"]) > 50

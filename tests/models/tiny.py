@@ -1,6 +1,6 @@
 """Tiny LeRobot policies with random weights, made offline; runs in the models' environment.
 
-python tiny.py make NAME FOLDER     write a checkpoint of act, xvla, pi05 or diffusion
+python tiny.py make NAME FOLDER [CAMERA CAMERA CAMERA]     write a checkpoint of a model of MAKERS
 python tiny.py batch NAME FOLDER    load it as we serve it and compare a batch with single queries
 python tiny.py prompt pi05 FOLDER   how many numbers of state its prompt has, by `state_prompt`
 python tiny.py noise                 which of torch's random functions follow the seeds row by row
@@ -29,16 +29,12 @@ from robospa.clients.model_policy import NotByRow, Query, seeded_rows
 from robospa.protocol.conformance import synthetic_observation
 from robospa.protocol.policy import TrialInfo
 
+Views = tuple[str, ...]
 VIEWS = ("head_camera", "left_camera", "right_camera")
-BASE_VIEWS = {
-    "xvla": ("image", "image2", "image3"),
-    "smolvla": ("camera1", "camera2", "camera3"),
-}
-"""What the published bases call their cameras."""
 WORDS = "Pick up the largest cube."
 
 
-def features(width: int, size: tuple[int, int], views: tuple[str, ...] = VIEWS) -> dict[str, Any]:
+def features(width: int, size: tuple[int, int], views: Views = VIEWS) -> dict[str, Any]:
     """Inputs and outputs of a policy with `width` numbers; `size` (height, width) of images."""
     inputs = {
         f"observation.images.{view}": PolicyFeature(FeatureType.VISUAL, (3, *size))
@@ -49,7 +45,7 @@ def features(width: int, size: tuple[int, int], views: tuple[str, ...] = VIEWS) 
     return {"input_features": inputs, "output_features": outputs}
 
 
-def statistics(width: int, views: tuple[str, ...] = VIEWS) -> dict[str, dict[str, torch.Tensor]]:
+def statistics(width: int, views: Views = VIEWS) -> dict[str, dict[str, torch.Tensor]]:
     """Means, deviations, bounds and quantiles of a data set that never was."""
     zero, one = torch.zeros(width), torch.ones(width)
     numbers = {"mean": zero, "std": 0.2 * one, "min": -one, "max": one, "q01": -one, "q99": one}
@@ -84,14 +80,14 @@ def tokenizer(folder: Path) -> str:
     return str(folder)
 
 
-def act(folder: Path) -> Any:
+def act(folder: Path, views: Views) -> Any:
     """ACT without patches: one camera, no pre-trained backbone."""
     from lerobot.policies.act.configuration_act import ACTConfig
     from lerobot.policies.act.modeling_act import ACTPolicy
 
     return ACTPolicy(
         ACTConfig(
-            **features(14, (240, 320), VIEWS[:1]),
+            **features(14, (240, 320), views[:1]),
             chunk_size=50,
             n_action_steps=50,
             dim_model=128,
@@ -106,14 +102,14 @@ def act(folder: Path) -> Any:
     )
 
 
-def diffusion(folder: Path) -> Any:
+def diffusion(folder: Path, views: Views) -> Any:
     """Diffusion policy without patches: one camera, two frames."""
     from lerobot.policies.diffusion.configuration_diffusion import DiffusionConfig
     from lerobot.policies.diffusion.modeling_diffusion import DiffusionPolicy
 
     return DiffusionPolicy(
         DiffusionConfig(
-            **features(14, (96, 128), VIEWS[:1]),
+            **features(14, (96, 128), views[:1]),
             n_obs_steps=2,
             horizon=16,
             n_action_steps=8,
@@ -129,7 +125,7 @@ def diffusion(folder: Path) -> Any:
     )
 
 
-def xvla(folder: Path) -> Any:
+def xvla(folder: Path, views: Views) -> Any:
     """X-VLA without patches, 0.86 million parameters."""
     from lerobot.policies.xvla.configuration_xvla import XVLAConfig
     from lerobot.policies.xvla.modeling_xvla import XVLAPolicy
@@ -159,7 +155,7 @@ def xvla(folder: Path) -> Any:
     }
     return XVLAPolicy(
         XVLAConfig(
-            **features(20, (224, 224), BASE_VIEWS["xvla"]),
+            **features(20, (224, 224), views),
             florence_config={"vision_config": vision, "text_config": text, "image_token_id": 300},
             tokenizer_name=tokenizer(folder / "tokenizer"),
             tokenizer_max_length=50,
@@ -207,7 +203,7 @@ def shrink_pi05() -> None:
     module.PiGemmaForCausalLM = small_expert
 
 
-def pi05(folder: Path) -> Any:
+def pi05(folder: Path, views: Views) -> Any:
     """pi0.5 with the three patches."""
     shrink_pi05()
     from lerobot.policies.pi05.configuration_pi05 import PI05Config
@@ -216,7 +212,7 @@ def pi05(folder: Path) -> Any:
     tokenizer(folder / "tokenizer")
     return PI05Policy(
         PI05Config(
-            **features(14, (240, 320)),
+            **features(14, (240, 320), views),
             image_resolution=(56, 56),
             chunk_size=10,
             n_action_steps=10,
@@ -226,7 +222,7 @@ def pi05(folder: Path) -> Any:
     )
 
 
-def smolvla(folder: Path) -> Any:
+def smolvla(folder: Path, views: Views) -> Any:
     """SmolVLA without patches: LeRobot takes its language model's sizes from a folder."""
     from lerobot.policies.smolvla.configuration_smolvla import SmolVLAConfig
     from lerobot.policies.smolvla.modeling_smolvla import SmolVLAPolicy
@@ -267,7 +263,7 @@ def smolvla(folder: Path) -> Any:
     )
     return SmolVLAPolicy(
         SmolVLAConfig(
-            **features(14, (240, 320), BASE_VIEWS["smolvla"]),
+            **features(14, (240, 320), views),
             vlm_model_name=str(language),
             resize_imgs_with_padding=(64, 64),
             num_vlm_layers=2,
@@ -282,21 +278,21 @@ def smolvla(folder: Path) -> Any:
 MAKERS = {"act": act, "xvla": xvla, "pi05": pi05, "diffusion": diffusion, "smolvla": smolvla}
 
 
-def make(name: str, where: str) -> None:
-    """Write the checkpoint and its processors."""
+def make(name: str, where: str, *views: str) -> None:
+    """Write the checkpoint, of cameras by these names, and its processors."""
     torch.manual_seed(0)
     folder = Path(where).resolve()
     folder.mkdir(parents=True, exist_ok=True)
-    policy = MAKERS[name](folder)
+    policy = MAKERS[name](folder, views or VIEWS)
     config = policy.config
     width = config.output_features["action"].shape[0]
-    views = tuple(key.rpartition(".")[2] for key in config.image_features)
+    cameras = tuple(key.rpartition(".")[2] for key in config.image_features)
     if name == "pi05":  # its factory looks for a gated tokenizer, by this name, in the hub or here
         link = folder / "google" / "paligemma-3b-pt-224"
         link.parent.mkdir(exist_ok=True)
         tokenizer(link)
         os.chdir(folder)
-    before, after = make_pre_post_processors(config, dataset_stats=statistics(width, views))
+    before, after = make_pre_post_processors(config, dataset_stats=statistics(width, cameras))
     for part in (policy, before, after):
         part.save_pretrained(str(folder))
     parameters = sum(parameter.numel() for parameter in policy.parameters())
