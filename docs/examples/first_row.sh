@@ -5,7 +5,7 @@
 #
 # Run on one machine with a GPU. What exists already is not made again, so the same command goes on.
 # LEROBOT is the folder of LeRobot's environment, BASE other weights to begin with; EPISODES (a level),
-# STEPS, BATCH, TRIALS and DEVICE may be smaller for a try. Further words go to lerobot-train.
+# STEPS, BATCH, TRIALS, DEVICE and VIDEO may be smaller for a try. Further words go to lerobot-train.
 
 set -euo pipefail
 
@@ -38,5 +38,5 @@ esac
 server=$!
 trap 'kill "$server"' EXIT
 "$robospa" eval "ws://127.0.0.1:${PORT:-8000}" --tasks "$task" --trials "${TRIALS:-100}" --wait 600 \
-    --video failures --auto-resume --out "$out/run"
+    --video "${VIDEO:-failures}" --auto-resume --out "$out/run"
 "$robospa" report "$out/run"

@@ -62,7 +62,14 @@ def test_a_row_is_made_to_its_report(model: str, tmp_path: Path) -> None:
         path = lerobot / "bin" / name
         path.write_text(PROGRAM.format(python=PYTHON, here=HERE, module=module))
         path.chmod(0o755)
-    small = {"EPISODES": "1", "STEPS": "2", "BATCH": "2", "TRIALS": "1", "DEVICE": "cpu"}
+    small = {
+        "EPISODES": "1",
+        "STEPS": "2",
+        "BATCH": "2",
+        "TRIALS": "1",
+        "DEVICE": "cpu",
+        "VIDEO": "none",
+    }
     places = {"BASE": base, "LEROBOT": lerobot, "ROBOSPA": Path(sys.executable).parent / "robospa"}
     command = ["bash", str(ROOT / "docs/examples/first_row.sh"), model, "Pick_Blocks_Size", out]
     words = [f"--policy.{name}={value}" for name, value in WORDS[model].items()]
