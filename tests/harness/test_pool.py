@@ -164,7 +164,9 @@ Films(WorkerConfig(out, "hold")).add([trial_record(KEYS[0], False)])""",
     "probe": """
 from robospa.harness.running.evaluate import probe_world
 from robospa.harness.running.worker import WorkerConfig
-probe_world(WorkerConfig(out, "hold", world="time:sleep", world_arguments={"seconds": 1}), False)
+slow = {"object_list": [], "timeout": 60}
+world = {"world": "multiprocessing.connection:wait", "world_arguments": slow}
+probe_world(WorkerConfig(out, "hold", **world), False)
 """,
     "collection": """
 from collect_fakes import order
