@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from textwrap import indent
 
 import pytest
 from collect_fakes import order
@@ -234,7 +235,8 @@ threading.Thread(target=kill_parent, daemon=True).start()
 )
 def test_no_process_outlives_its_parent(tmp_path: Path, use: str, after: float) -> None:
     script = tmp_path / "driver.py"
-    script.write_text(DRIVER + USES[use] + "\ntime.sleep(60)\n")
+    # What ends first, or fails as what is faked here does, waits to be killed.
+    script.write_text(f"{DRIVER}try:\n{indent(USES[use], '    ')}\nfinally:\n    time.sleep(60)\n")
     done = subprocess.run(
         [sys.executable, str(script), str(tmp_path), str(after)],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
