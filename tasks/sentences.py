@@ -41,21 +41,13 @@ def sentences(scene: Scene, split: str, salt: str = "") -> tuple[str, ...]:
     Every template of the split is used equally often, with different phrasings in its slots.
     ValueError if the split is unknown or the slots have too few phrasings.
     """
-    which = _split_index(split)
-    slots = catalog.task(scene.task).slots(scene)
-    phrasings = {name: both[min(which, 1)] for name, both in slots.items()}
-    chosen = templates(scene.task, scene.level)[which]
-    share = SENTENCES // len(chosen)
-    rng = _generator(scene, split, "sentences", salt)
-    made = [s for template in chosen for s in _fillings(template, phrasings, share, rng)]
+    made = [fill(*chosen) for chosen in _drawn(scene, split, salt)]
     if len(set(made)) != SENTENCES:
         raise ValueError(
             f"{scene.task} level {scene.level} seed {scene.seed} has {len(set(made))} distinct "
             f"{split} sentences instead of {SENTENCES}; add phrasings to its slots"
         )
-    if scene.clutter and catalog.task(scene.task).dimension != "procedural":
-        made = told_apart(made, scene)
-    return tuple(made)
+    return tuple(_in_clutter(made, scene))
 
 
 def instruction(scene: Scene, split: str = "heldout", salt: str = "") -> str:
@@ -69,20 +61,30 @@ def instruction(scene: Scene, split: str = "heldout", salt: str = "") -> str:
         other = catalog.build_scene(scene.task, scene.level, FIRST_TRAINING_SEED + drawn, salt=salt)
         return instruction(other, split, salt)
     split = "indirect" if "indirect" in scene.strengths else split
-    made = sentences(scene, split, salt)
     index = int(_generator(scene, split, "instruction", salt).integers(SENTENCES))
     if "nothing-here" in scene.strengths:
         return about_nothing_here(scene, _generator(scene, split, "nothing here", salt))
     if axis := next((name for name in REWORDED if name in scene.strengths), ""):
         share = SENTENCES // len(templates(scene.task, scene.level)[_split_index(split)])
-        rng = _generator(scene, split, axis, salt)
+        rng, made = _generator(scene, split, axis, salt), sentences(scene, split, salt)
         return reworded(made, index, share, axis, scene.strengths[axis], rng)
-    return made[index]
+    return _in_clutter([fill(*_drawn(scene, split, salt)[index])], scene)[0]
+
+
+def _drawn(scene: Scene, split: str, salt: str) -> list[tuple[str, dict[str, str]]]:
+    """The template and the phrasings of each of the scene's sentences."""
+    which = _split_index(split)
+    slots = catalog.task(scene.task).slots(scene)
+    phrasings = {name: both[min(which, 1)] for name, both in slots.items()}
+    chosen = templates(scene.task, scene.level)[which]
+    share = SENTENCES // len(chosen)
+    rng = _generator(scene, split, "sentences", salt)
+    return [(one, found) for one in chosen for found in _fillings(one, phrasings, share, rng)]
 
 
 def _fillings(
     template: str, phrasings: Mapping[str, tuple[str, ...]], count: int, rng: np.random.Generator
-) -> list[str]:
+) -> list[dict[str, str]]:
     names = slot_names(template)
     missing = [name for name in names if name not in phrasings]
     if missing:
@@ -91,7 +93,13 @@ def _fillings(
     if len(choices) < count:
         raise ValueError(f"only {len(choices)} of {count} fillings of {template!r}; add phrasings")
     picked = rng.permutation(len(choices))[:count]
-    return [fill(template, dict(zip(names, choices[int(i)], strict=True))) for i in picked]
+    return [dict(zip(names, choices[int(i)], strict=True)) for i in picked]
+
+
+def _in_clutter(sentences: list[str], scene: Scene) -> list[str]:
+    """The sentences as they are said where other things lie about, too."""
+    apart = scene.clutter and catalog.task(scene.task).dimension != "procedural"
+    return told_apart(sentences, scene) if apart else sentences
 
 
 def _split_index(split: str) -> int:

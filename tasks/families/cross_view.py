@@ -168,14 +168,15 @@ def fits(workcell: Workcell, spread: ObjectSpread, level: int, roles: NDArray[np
     least = np.array(spread.leads[level - 1])[AXES]
 
     def rule(points: Array, moved_to: Array, i: int) -> Mask:
-        moved = points.copy()
-        moved[:, i] = moved_to
+        good = spread.allowed(workcell, moved_to[:, 0], moved_to[:, 1])
+        good[good] = spread.apart(workcell, points[good], moved_to[good], i)
+        moved, asked = points[good], np.broadcast_to(roles, (len(points), 4))[good]
+        moved[:, i] = moved_to[good]
         place, lead = leaders(moved)
         u, v = workcell.head.pixel(moved[..., 0], moved[..., 1], middle)
         seen = leaders(np.stack([u, -v], axis=-1))[0]
-        clear = ((place == roles) & (seen == roles) & (lead >= least)).all(axis=1)
-        allowed = spread.allowed(workcell, moved_to[:, 0], moved_to[:, 1])
-        return np.asarray(clear & allowed & spread.apart(workcell, points, moved_to, i))
+        good[good] = ((place == asked) & (seen == asked) & (lead >= least)).all(axis=1)
+        return np.asarray(good)
 
     return rule
 

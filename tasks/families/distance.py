@@ -153,9 +153,9 @@ def clearing(workcell: Workcell, rules: Rules, level: int) -> Fits:
     def good(points: Array, place: Array, i: int) -> Mask:
         mask = valid(points, place, i)
         if mask.any():
-            moved = points.copy()
-            moved[:, i] = place
-            mask &= unclear(moved, gap) <= unclear(points, gap)
+            moved, before = points[mask], points[mask]
+            moved[:, i] = place[mask]
+            mask[mask] = unclear(moved, gap) <= unclear(before, gap)
         return mask
 
     return good
