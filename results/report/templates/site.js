@@ -141,8 +141,10 @@ function draw(focus) {
     const link = make("a", { href: `models/${m.id}/index.html` }, m.name);
     const more = [m.team, data.training[m.training]].filter(Boolean).join(" · ");
     row.append(make("th", { className: "name", scope: "row" }, link, make("small", {}, more)));
-    if (!columns.some((c) => shownValue(m, c))) row.append(make("td", { className: "some", colSpan: columns.length }, partsRun(m)));
-    else columns.forEach((c, n) => {
+    const gap = longestGap(m);
+    columns.forEach((c, n) => {
+      if (n === gap.from) row.append(make("td", { className: "some", colSpan: gap.length }, partsRun(m)));
+      if (n >= gap.from && n < gap.from + gap.length) return;
       const v = shownValue(m, c);
       const other = official(m, c);
       const place = places[n].get(m);
@@ -169,12 +171,23 @@ function draw(focus) {
     ? `${models.length} of ${data.models.length} models, ${main.size ? "ranked" : "sorted"} by ${by.title ? by.label + " (" + by.title + ")" : by.label}` +
       (shown.length > 1 ? ", each group separately" : "") : "no model matches";
 }
-// What a model has values of that none of the columns shows: categories, else tasks.
+// The longest run of columns, of three at least, of which a model has no values.
+function longestGap(m) {
+  let longest = { from: -1, length: 2 };
+  columns.forEach((_, from) => {
+    const length = [...columns.slice(from), null].findIndex((c) => !c || shownValue(m, c));
+    if (length > longest.length) longest = { from, length };
+  });
+  return longest.from < 0 ? { from: -1, length: 0 } : longest;
+}
+// What a model has values of that such columns do not show: categories, else tasks.
 function partsRun(m) {
   const at = (metric, row) => value(m, { metric, row, level: 0 });
-  const run = ["category", "task"].map((kind) => ROWS.filter((r) => data.rows[r].kind === kind && at("sr", r))).find((rows) => rows.length) ?? [];
-  return run.map((r) => `${data.rows[r].kind === "task" ? rowName(r) : r} ${["sr1", "sr"].filter((metric) => at(metric, r))
-    .map((metric) => `${data.metrics[metric]} ${percent(at(metric, r)[0])}`).join(", ")}`).join("; ") || "–";
+  for (const [kind, metric] of ["category", "task"].flatMap((k) => [[k, "sr1"], [k, "sr"]])) {
+    const rows = ROWS.filter((r) => data.rows[r].kind === kind && at(metric, r));
+    if (rows.length) return `${data.metrics[metric]}: ` + rows.map((r) => `${kind === "task" ? rowName(r) : r} ${percent(at(metric, r)[0])}`).join(", ");
+  }
+  return "–";
 }
 function change() {
   columns = columnsOf();
