@@ -1,7 +1,9 @@
-"""The command line, called in this process: a Python of its own costs a second each time."""
+"""The command line, called in this process: a Python of its own (`printed`) costs a second each."""
 
 import io
 import os
+import subprocess
+import sys
 from contextlib import redirect_stderr, redirect_stdout
 from typing import NamedTuple
 from unittest import mock
@@ -27,3 +29,12 @@ def robospa(*words: object, columns: int = 300) -> Done:
         except SystemExit as end:
             code = end.code if isinstance(end.code, int) else int(end.code is not None)
     return Done(code, out.getvalue(), err.getvalue())
+
+
+def printed(code: str, **environment: str) -> str:
+    """What a Python of its own prints that runs `code`."""
+    words = [sys.executable, "-W", "ignore", "-c", code]
+    env = {**os.environ, **environment}
+    done = subprocess.run(words, env=env, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return done.stdout

@@ -16,7 +16,7 @@ from tiny_datasets import SIZE, painted, tiny_dataset, tiny_episode, written
 
 from robospa.action_space import ActionSpace
 from robospa.harness.convention_check.episodes import read_episode
-from robospa.harness.datasets import lerobot
+from robospa.harness.datasets import lerobot, statistics
 from robospa.harness.datasets import verify as verification
 from robospa.harness.datasets.episode import DatasetEpisode
 from robospa.harness.datasets.features import layout_of
@@ -32,14 +32,6 @@ from robospa.harness.datasets.manifest import (
     read_record,
 )
 from robospa.harness.datasets.pack import FORMATS, files_below, pack
-from robospa.harness.datasets.statistics import (
-    BINS,
-    QUANTILES,
-    ColourHistogram,
-    Moments,
-    RangeHistogram,
-    row_stats,
-)
 from robospa.harness.datasets.verify import verify
 from robospa.observation import CameraSpec
 
@@ -289,7 +281,7 @@ def test_mistakes_and_midstates_are_replayed_as_what_they_are(tmp_path: Path) ->
 
 
 def test_the_statistics_of_one_to_a_hundred() -> None:
-    found = row_stats(np.arange(1, 101)[:, None])
+    found = statistics.row_stats(np.arange(1, 101)[:, None])
     assert [found[name].item() for name in ("min", "max", "mean")] == [1, 100, 50.5]
     assert found["q50"].item() == 50.5 and np.isclose(found["q01"].item(), 1.99)
     assert found["count"].tolist() == [100]
@@ -298,10 +290,10 @@ def test_the_statistics_of_one_to_a_hundred() -> None:
 def test_lots_add_up_to_what_all_rows_give_at_once() -> None:
     rng = np.random.default_rng(0)
     lots = [rng.normal(k, 1 + k, (3 + 40 * k, 4)) for k in range(5)]
-    moments = Moments()
+    moments = statistics.Moments()
     for lot in lots:
-        moments.add(row_stats(lot))
-    whole = row_stats(np.concatenate(lots))
+        moments.add(statistics.row_stats(lot))
+    whole = statistics.row_stats(np.concatenate(lots))
     for name, value in moments.stats().items():
         np.testing.assert_allclose(value, whole[name], rtol=1e-12)
 
@@ -310,22 +302,22 @@ def test_quantiles_of_a_histogram_are_within_a_bin() -> None:
     rng = np.random.default_rng(1)
     rows = np.stack([rng.exponential(2, 4000), rng.normal(size=4000), np.full(4000, 3.0)], axis=1)
     low, high = rows.min(axis=0), rows.max(axis=0)
-    histogram = RangeHistogram(low, high)
+    histogram = statistics.RangeHistogram(low, high)
     for lot in np.split(rows, 8):
         histogram.add(lot)
     found = histogram.quantiles()
-    for name, share in QUANTILES.items():
+    for name, share in statistics.QUANTILES.items():
         lower, upper = (
             np.quantile(rows, share, axis=0, method=m) for m in ("lower", "higher")
         )  # between two neighbours any value is a quantile
-        room = (high - low) / BINS
+        room = (high - low) / statistics.BINS
         assert (found[name] >= lower - room).all() and (found[name] <= upper + room).all()
 
 
 def test_colours_are_those_of_the_pixels() -> None:
     rng = np.random.default_rng(2)
     pictures = rng.integers(5, 200, (7, 6, 8, 3)).astype(np.uint8)
-    first, second = ColourHistogram(), ColourHistogram()
+    first, second = statistics.ColourHistogram(), statistics.ColourHistogram()
     for picture in pictures[:3]:
         first.add(picture)
     for picture in pictures[3:]:

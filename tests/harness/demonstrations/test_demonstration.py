@@ -11,6 +11,7 @@ from robot_at_home import at_home
 
 from robospa.action_space import ActionSpace
 from robospa.geometry import Pose
+from robospa.harness.demonstrations import noise
 from robospa.harness.demonstrations.changed_plans import (
     Displace,
     GoWrong,
@@ -31,22 +32,6 @@ from robospa.harness.demonstrations.demonstration import (
     replay,
     show,
 )
-from robospa.harness.demonstrations.noise import (
-    ACCELERATION,
-    EXPERT,
-    MISTAKE,
-    NOISE,
-    RECOVERY,
-    STRENGTH,
-    TURN,
-    Noise,
-    PushLog,
-    depths,
-    deviation,
-    gaps,
-    push,
-    smooth_step,
-)
 from robospa.harness.demonstrations.recorder import (
     KEYFRAMES,
     STRIDE,
@@ -56,14 +41,7 @@ from robospa.harness.demonstrations.recorder import (
 )
 from robospa.harness.replay import replay as play
 from robospa.harness.robots import embodiment
-from robospa.harness.sim.motion import (
-    DEMONSTRATION_LIMITS,
-    HOLD_STEPS,
-    RATE,
-    Trajectory,
-    profile,
-    rest_to_rest,
-)
+from robospa.harness.sim import motion
 from robospa.harness.sim.sapien_world import POLL_STEPS, SapienWorld
 from robospa.harness.skills.pick import reachable_grasps
 from robospa.harness.skills.workspace import Workspace, moved_back
@@ -238,10 +216,10 @@ def shown(
 def test_noise_is_recovered_from_and_repeats_to_the_bit() -> None:
     made, recorder, label, action, record = shown("noise", "Pick_Blocks_Size")
     assert np.array_equal(recorder.commanded, shown("noise", "Pick_Blocks_Size")[1].commanded)
-    assert {EXPERT, NOISE, RECOVERY} == set(label.tolist())
+    assert {noise.EXPERT, noise.NOISE, noise.RECOVERY} == set(label.tolist())
     next_command = np.concatenate([recorder.commanded[1:], recorder.commanded[-1:]])
     differs = np.abs(action - next_command).max(axis=1) > 1e-4
-    assert (differs == (label == NOISE)).all()
+    assert (differs == (label == noise.NOISE)).all()
     plain = shown("expert", "Pick_Blocks_Size")[1]
     assert not np.array_equal(plain.commanded, recorder.commanded)
     assert np.allclose(plain.commanded[-1], recorder.commanded[-1], atol=0.05)
@@ -251,8 +229,8 @@ def test_noise_is_recovered_from_and_repeats_to_the_bit() -> None:
 @pytest.mark.sim
 def test_a_mistake_fails_as_it_should_and_says_where() -> None:
     made, recorder, label, _, record = shown("mistake:stops", "Stack_Blocks_Color_Order")
-    begins = int(np.flatnonzero(label == MISTAKE)[0])
-    assert 0 < begins < len(label) and (label[begins:] == MISTAKE).all()
+    begins = int(np.flatnonzero(label == noise.MISTAKE)[0])
+    assert 0 < begins < len(label) and (label[begins:] == noise.MISTAKE).all()
     assert not made.demonstration.success
     assert np.array_equal(recorder.commanded[-1], recorder.commanded[-5])
     failure = failure_type(record)
@@ -265,7 +243,7 @@ def test_a_mistake_fails_as_it_should_and_says_where() -> None:
 def test_skills_that_go_wrong_touch_the_right_thing_or_nothing(name: str) -> None:
     made, _, label, _, record = shown(f"mistake:{name}", "Pick_Blocks_Size")
     failure = failure_type(record)
-    assert not record.success and not made.demonstration.failures and MISTAKE in label
+    assert not record.success and not made.demonstration.failures and noise.MISTAKE in label
     expected = "no_contact_grasp" if name == "beside" else "target_execution"
     assert failure is not None and failure.kind == expected
 
@@ -278,7 +256,7 @@ def test_a_midstate_begins_later_and_elsewhere_and_is_replayed_from_the_start() 
     assert np.array_equal(made.prefix_action[-1], first.commanded)
     home = np.concatenate([[*arm.home, 1.0] for arm in embodiment("aloha-agilex").arms])
     assert np.abs(first.commanded - home).max() > 0.2
-    assert set(label.tolist()) == {EXPERT}
+    assert set(label.tolist()) == {noise.EXPERT}
     assert made.demonstration.success and record.success
 
 
@@ -298,7 +276,7 @@ SHARE = 0.85
 )
 def test_a_replayed_demonstration_succeeds_within_the_step_limit(key: TrialKey) -> None:
     recorder = FrameRecorder(frame_steps(key.task))
-    made = demonstrate(SapienWorld(render=False, limits=DEMONSTRATION_LIMITS), key, recorder)
+    made = demonstrate(SapienWorld(render=False, limits=motion.DEMONSTRATION_LIMITS), key, recorder)
     assert made.success and not made.failures
     actions = recorder.commanded[1:]
     limit = task(key.task).levels[key.level].steps
@@ -324,7 +302,7 @@ class Clock:
         return {"state": state, "ee": np.zeros((2, 8), np.float32)}
 
     def snapshot(self) -> SimpleNamespace:
-        return SimpleNamespace(time=self.step / RATE)
+        return SimpleNamespace(time=self.step / motion.RATE)
 
     def still(self) -> int:
         return self.step
@@ -338,7 +316,7 @@ def recorded(lengths: list[int], stride: int = 15, rests: bool = False) -> Frame
         for _ in range(length):
             world.step += 1
             if world.step % POLL_STEPS == 0:
-                recorder.polled(world, world.step / RATE)  # type: ignore[arg-type]
+                recorder.polled(world, world.step / motion.RATE)  # type: ignore[arg-type]
         recorder.executed(world, np.zeros(14, np.float32), StepResult(length, False))  # type: ignore[arg-type]
     assert [frame.still for frame in recorder.frames] == [frame.step for frame in recorder.frames]
     commanded, measured, _, objects = recorder.columns()
@@ -374,35 +352,35 @@ def test_a_recording_may_begin_in_the_midst_of_a_trial() -> None:
 
 
 def test_a_rest_is_one_frame_however_long_the_action() -> None:
-    assert len(recorded([HOLD_STEPS, HOLD_STEPS], rests=True)) == 1 + 2
+    assert len(recorded([motion.HOLD_STEPS, motion.HOLD_STEPS], rests=True)) == 1 + 2
 
 
 def test_strides_are_those_of_polls_and_no_wait_gets_shorter() -> None:
     assert set(STRIDES) <= set(tasks())
     for stride in (STRIDE, *STRIDES.values()):
-        assert STRIDE <= stride <= HOLD_STEPS and stride % POLL_STEPS == 0
+        assert STRIDE <= stride <= motion.HOLD_STEPS and stride % POLL_STEPS == 0
     assert frame_steps("Press_Stapler_Memory") == 20 and frame_steps("Pick_Blocks_Size") == STRIDE
 
 
 # ----------- noise: pushes that are smooth, bounded and gone at their end, where there is clearance
 
 
-PROGRESS = profile(1.5, DEMONSTRATION_LIMITS)[0]
+PROGRESS = motion.profile(1.5, motion.DEMONSTRATION_LIMITS)[0]
 """Of a motion of 1.5 rad: 433 physics steps."""
 
 
 def test_a_smooth_step_goes_from_nothing_to_all() -> None:
-    assert smooth_step(np.array([-1.0, 0.0, 0.5, 1.0, 2.0])).tolist() == [0, 0, 0.5, 1, 1]
+    assert noise.smooth_step(np.array([-1.0, 0.0, 0.5, 1.0, 2.0])).tolist() == [0, 0, 0.5, 1, 1]
 
 
 @pytest.mark.parametrize("strong", [0.05, 100.0])
 def test_a_push_is_bounded_and_gone_at_the_end(strong: float) -> None:
-    made = push(PROGRESS, np.array([1.0, -0.5, 0.0]) * strong, 0.2, 0.5)
+    made = noise.push(PROGRESS, np.array([1.0, -0.5, 0.0]) * strong, 0.2, 0.5)
     assert (made.offset[0] == 0).all() and (made.offset[-1] == 0).all()
-    assert np.abs(made.shift).max() <= TURN + 1e-9
-    added = np.abs(np.diff(made.offset, n=2, axis=0)).max() * RATE**2
-    assert added <= ACCELERATION + 1e-6
-    assert added == pytest.approx(ACCELERATION) or strong < 1
+    assert np.abs(made.shift).max() <= noise.TURN + 1e-9
+    added = np.abs(np.diff(made.offset, n=2, axis=0)).max() * motion.RATE**2
+    assert added <= noise.ACCELERATION + 1e-6
+    assert added == pytest.approx(noise.ACCELERATION) or strong < 1
     assert (made.offset[:, 2] == 0).all()
     after = made.shift[round(0.5 * len(PROGRESS)) :]
     assert (after == after[-1]).all()
@@ -410,7 +388,7 @@ def test_a_push_is_bounded_and_gone_at_the_end(strong: float) -> None:
 
 def test_after_a_push_the_way_is_a_straight_line_to_the_goal() -> None:
     line = PROGRESS[:, None] * np.array([1.5, 1.0])
-    way = line + push(PROGRESS, np.array([0.05, -0.1]), 0.1, 0.4).offset
+    way = line + noise.push(PROGRESS, np.array([0.05, -0.1]), 0.1, 0.4).offset
     rest = way[round(0.4 * len(way)) :]
     ahead = rest[-1] - rest
     assert np.allclose(ahead[:, 0] * ahead[0, 1], ahead[:, 1] * ahead[0, 0])
@@ -418,7 +396,7 @@ def test_after_a_push_the_way_is_a_straight_line_to_the_goal() -> None:
 
 def test_labels_and_actions_of_a_pushed_motion() -> None:
     space, count = ActionSpace("joint"), len(PROGRESS)
-    log, made = PushLog(6), push(PROGRESS, np.full(6, 0.05), 0.2, 0.5)
+    log, made = noise.PushLog(6), noise.push(PROGRESS, np.full(6, 0.05), 0.2, 0.5)
     log.append(50, {})
     log.append(count, {1: made})
     log.append(50, {})
@@ -432,11 +410,11 @@ def test_labels_and_actions_of_a_pushed_motion() -> None:
             commanded[t, right] = 1.0
     label, action = log.annotate(space, commanded, steps)
     following = np.concatenate([commanded[1:], commanded[-1:]])
-    pushed = np.flatnonzero(label == NOISE)
+    pushed = np.flatnonzero(label == noise.NOISE)
     assert (np.diff(pushed) == 1).all() and len(pushed) > 3
-    assert set(label[: pushed[0]]) == {EXPERT}
-    assert (label[-2:] == EXPERT).all() and label[pushed[-1] + 1] == RECOVERY
-    own = label != NOISE
+    assert set(label[: pushed[0]]) == {noise.EXPERT}
+    assert (label[-2:] == noise.EXPERT).all() and label[pushed[-1] + 1] == noise.RECOVERY
+    own = label != noise.NOISE
     assert np.allclose(action[own], following[own], atol=1e-4)
     assert (np.abs(action - following)[pushed].max(axis=1) > 1e-4).all()
     assert (action[:, space.arms[0].body] == 0).all()
@@ -468,21 +446,21 @@ def workspace() -> Workspace:
     return at_home("aloha-agilex", block)
 
 
-def way_to_the_block(ws: Workspace, share: float = 1.0) -> Trajectory:
+def way_to_the_block(ws: Workspace, share: float = 1.0) -> motion.Trajectory:
     """The left arm's motion from home to 8 cm before it would grasp, or a first part of it."""
     grasp = reachable_grasps(ws, "b", (0,))[0]
     goal = ws.solve(0, moved_back(grasp.pose, grasp.approach, 0.08), grasp.joints)
     assert goal is not None
     start, opened = np.array(ws.joints), np.ones(2)
     there = np.array([start[0] + share * (goal - start[0]), start[1]])
-    return rest_to_rest(start, there, opened, opened, opened, DEMONSTRATION_LIMITS)
+    return motion.rest_to_rest(start, there, opened, opened, opened, motion.DEMONSTRATION_LIMITS)
 
 
-def disturbed(path: Trajectory, *touched: str, seed: int = 0) -> Trajectory:
+def disturbed(path: motion.Trajectory, *touched: str, seed: int = 0) -> motion.Trajectory:
     ws = workspace()
     contacts = tuple(Contact("left_gripper", name, (0.0, 0.0, 0.0)) for name in touched)
     world = AtHome(ws.snapshot, contacts)
-    return Noise(world, ws, np.random.default_rng(seed)).disturb(path)  # type: ignore[arg-type]
+    return noise.Noise(world, ws, np.random.default_rng(seed)).disturb(path)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -494,9 +472,10 @@ def test_a_disturbed_way_has_the_same_ends_and_keeps_to_its_bounds(seed: int) ->
     assert (way.velocities[:, -1] == path.velocities[:, -1]).all()
     assert np.array_equal(way.joints[1], path.joints[1])
     tip = ws.hand(0).tip
-    off, _ = deviation(ws.chains[0], tip, path.joints[0], way.joints[0])
-    assert 0.003 <= off <= STRENGTH * 1.05
-    assert depths(ws, 0, way.joints[0, ::20]).max() <= depths(ws, 0, path.joints[0]).max() + 0.002
+    off, _ = noise.deviation(ws.chains[0], tip, path.joints[0], way.joints[0])
+    assert 0.003 <= off <= noise.STRENGTH * 1.05
+    pushed, straight = (noise.depths(ws, 0, at.joints[0, ::20]).max() for at in (way, path))
+    assert pushed <= straight + 0.002
 
 
 def test_a_short_motion_and_a_gripper_that_touches_something_unknown_are_left_alone() -> None:
@@ -507,6 +486,6 @@ def test_a_short_motion_and_a_gripper_that_touches_something_unknown_are_left_al
 def test_room_ends_at_the_block_and_at_the_table() -> None:
     ws = workspace()
     grasp = reachable_grasps(ws, "b", (0,))[0]
-    assert depths(ws, 0, ws.joints[0][None])[0] == 0.0
-    assert depths(ws, 0, grasp.joints[None])[0] > 0.005
-    assert gaps(ws, ws.joints[0][None], ws.joints[1][None])[0] > 0.2
+    assert noise.depths(ws, 0, ws.joints[0][None])[0] == 0.0
+    assert noise.depths(ws, 0, grasp.joints[None])[0] > 0.005
+    assert noise.gaps(ws, ws.joints[0][None], ws.joints[1][None])[0] > 0.2

@@ -8,17 +8,8 @@ import pytest
 
 import robospa
 from robospa.harness.running.code_hash import files_of
-from robospa.harness.seeds import lists as module
+from robospa.harness.seeds import lists
 from robospa.harness.seeds.attempt import Attempt, Evidence
-from robospa.harness.seeds.lists import (
-    LOCAL,
-    SHIPPED,
-    find_list,
-    inputs,
-    local_file,
-    read_levels,
-    save,
-)
 from robospa.harness.seeds.sweep import PATIENCE, Search, sweep
 from robospa.harness.selection import list_trials, parse_embodiments, parse_modes, seed_sources
 from robospa.harness.settings import Selection, SettingsError
@@ -122,21 +113,21 @@ def test_inputs_are_of_what_a_task_executes(monkeypatch: pytest.MonkeyPatch) -> 
         counted.extend(files_of(root, folders, left_out))
         return ""
 
-    monkeypatch.setattr(module, "code_hash", hashed)
-    module._hash.cache_clear()
-    first = inputs(KEY)
-    module._hash.cache_clear()
+    monkeypatch.setattr(lists, "code_hash", hashed)
+    lists._hash.cache_clear()
+    first = lists.inputs(KEY)
+    lists._hash.cache_clear()
     for path in ("harness/skills/pick.py", "tasks/objects/boxes.py", "harness/robots/piper.py",
                  "tasks/families/block_measures.py", "baselines/oracle.py"):  # fmt: skip
         assert path in counted
     for path in ("tasks/families/repeat.py", "tasks/instructions/__init__.py",
                  "harness/running/runner.py", "protocol/server.py"):  # fmt: skip
         assert (root / path).exists() and path not in counted
-    assert inputs(KEY._replace(level=5)) == first
+    assert lists.inputs(KEY._replace(level=5)) == first
     other = KEY._replace(mode="own:light")
-    monkeypatch.setattr(module, "module_of", lambda group, name: "numpy" * (name == "own"))
-    assert inputs(other) != first
-    module._hash.cache_clear()
+    monkeypatch.setattr(lists, "module_of", lambda group, name: "numpy" * (name == "own"))
+    assert lists.inputs(other) != first
+    lists._hash.cache_clear()
 
 
 def test_a_list_made_here_is_found_by_evaluations_until_its_inputs_change(
@@ -145,16 +136,16 @@ def test_a_list_made_here_is_found_by_evaluations_until_its_inputs_change(
     monkeypatch.setenv("ROBOSPA_CACHE", str(tmp_path))
     key = KEY._replace(mode="randomized:clutter=3")
     with pytest.raises(NoSeedList, match="--mode randomized:clutter=3"):
-        find_list(key)
-    save(local_file(key), 1, [5, 6, 7])
-    save(local_file(key), 2, [8])
-    assert find_list(key).origin == LOCAL and find_list(key).seeds == (5, 6, 7)
-    assert find_list(KEY).origin == SHIPPED
+        lists.find_list(key)
+    lists.save(lists.local_file(key), 1, [5, 6, 7])
+    lists.save(lists.local_file(key), 2, [8])
+    assert lists.find_list(key).origin == lists.LOCAL and lists.find_list(key).seeds == (5, 6, 7)
+    assert lists.find_list(KEY).origin == lists.SHIPPED
     chosen = Selection("Pick_Blocks_Size", "1", 2, mode="randomized:clutter=3")
     trials = list_trials(chosen)
     assert [trial.seed for trial in trials] == [5, 6]
     (row,) = seed_sources(chosen, trials)
-    assert (row["origin"], row["hash"]) == (LOCAL, list_hash({key: (5, 6, 7)}))
+    assert (row["origin"], row["hash"]) == (lists.LOCAL, list_hash({key: (5, 6, 7)}))
     monkeypatch.setattr("robospa.harness.seeds.lists.inputs", lambda key: "other")
     with pytest.raises(
         SettingsError, match="make them with `robospa seeds Pick_Blocks_Size --levels"
@@ -168,7 +159,7 @@ def test_a_run_knows_whose_seeds_it_takes() -> None:
     assert row == {
         "embodiment": "aloha-agilex",
         "mode": "clean",
-        "origin": SHIPPED,
+        "origin": lists.SHIPPED,
         "hash": list_hash({KEY: accepted(*KEY), KEY._replace(level=2): accepted(KEY.task, 2)}),
     }
     given = Selection("Pick_Blocks_Size", "1", 2, "7-8", mode="randomized")
@@ -191,14 +182,14 @@ def test_one_command_makes_all_lists_that_are_missing(
 def test_an_empty_list_takes_the_old_one_out(tmp_path: Path) -> None:
     path = tmp_path / "robot" / "T.json"
     for level, seeds in ((2, [1]), (1, [3, 4]), (2, [])):
-        save(path, level, seeds)
-    assert read_levels(path) == {1: (3, 4)}
+        lists.save(path, level, seeds)
+    assert lists.read_levels(path) == {1: (3, 4)}
     path.write_text("{")
-    assert read_levels(path) == {}
+    assert lists.read_levels(path) == {}
 
 
 def test_modes_with_equal_bodies_share_their_lists() -> None:
-    assert find_list(KEY._replace(mode="randomized:light,texture")).origin == SHIPPED
+    assert lists.find_list(KEY._replace(mode="randomized:light,texture")).origin == lists.SHIPPED
     names = "clean, randomized:light,clutter,randomized:height,randomized-seen"
     assert parse_modes(names) == [
         "clean", "randomized:light,clutter", "randomized:height", "randomized-seen"

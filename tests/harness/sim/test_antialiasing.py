@@ -1,6 +1,7 @@
 """What becomes of a picture that was taken: its parts, sky and smoothed edges. Needs no device."""
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -75,15 +76,10 @@ def test_pictures_of_any_size_and_colours_are_between_what_was_there(
 SKY = np.array([101, 112, 103], dtype=np.uint8)
 
 
-class Camera:
-    """Has taken `picture`, RGBA (height, width, 4)."""
-
-    def __init__(self, picture: Bytes) -> None:
-        self.picture = picture
-
-    def get_picture(self, name: str) -> Bytes:
-        assert name == "Color"
-        return self.picture
+def taken(row: Bytes, count: int) -> list[Bytes]:
+    """What becomes of RGBA (height, width, 4) that a camera has taken."""
+    camera: Any = SimpleNamespace(get_picture={"Color": row}.__getitem__)
+    return pixels(camera, SKY, count)
 
 
 def random_picture(width: int) -> Bytes:
@@ -92,9 +88,7 @@ def random_picture(width: int) -> Bytes:
 
 def test_a_row_is_cut_into_its_pictures() -> None:
     row = random_picture(12)
-    camera: Any = Camera(row)
-    images = pixels(camera, SKY, 3)
-    for image, part in zip(images, np.split(row, 3, axis=1), strict=True):
+    for image, part in zip(taken(row, 3), np.split(row, 3, axis=1), strict=True):
         assert image.flags.c_contiguous and image.flags.owndata
         np.testing.assert_array_equal(image, part[..., :3])
 
@@ -102,8 +96,7 @@ def test_a_row_is_cut_into_its_pictures() -> None:
 def test_the_sky_is_where_nothing_was_drawn_and_nowhere_else() -> None:
     row = random_picture(8)
     row[2, 1] = row[4, 7] = 0
-    camera: Any = Camera(row)
     drawn = row[..., :3].copy()
-    left, right = pixels(camera, SKY, 2)
+    left, right = taken(row, 2)
     assert left[2, 1].tolist() == right[4, 3].tolist() == SKY.tolist()
     assert (np.hstack([left, right]) != drawn).any(axis=2).sum() == 2

@@ -1,6 +1,7 @@
 """Named colours and bodies of many materials as the head camera shows them."""
 
 import itertools
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -60,10 +61,11 @@ def usual_camera(renderer: Renderer) -> sapien.render.RenderCameraComponent:
     return camera
 
 
-def seen(renderer: Renderer, bodies: list[tuple[list[Shape], Pose]]) -> tuple[Image, Image]:
+def seen(renderer: Renderer, bodies: list[tuple[Sequence[Shape], Pose]]) -> tuple[Image, Image]:
     """The head's picture of shapes at poses, and which of them (1, 2, ...) each pixel shows."""
     entities = [renderer._draw(shapes, "thing") for shapes, _ in bodies]
     for entity, (_, pose) in zip(entities, bodies, strict=True):
+        assert entity is not None and len(entity.components[0].render_shapes) == 1
         entity.pose = to_sapien(pose)
     (image,) = renderer.render([HEAD], AWAY, {})
     ids = usual_camera(renderer).get_picture("Segmentation")[..., 1]
@@ -143,15 +145,9 @@ MIXED = (
 )
 
 
-def picture(renderer: Renderer, *bodies: tuple[Shape, ...]) -> np.ndarray:
+def picture(renderer: Renderer, *bodies: Sequence[Shape]) -> np.ndarray:
     """The head's picture of bodies in one place."""
-    entities = [renderer._draw(shapes, "thing") for shapes in bodies]
-    for entity in entities:
-        assert entity is not None and len(entity.components[0].render_shapes) == 1
-        entity.pose = to_sapien(Pose((0.0, 0.0, TABLE_TOP)))
-    (image,) = renderer.render([HEAD], AWAY, {})
-    for entity in entities:
-        renderer._scene.remove_entity(entity)
+    image, _ = seen(renderer, [(shapes, Pose((0.0, 0.0, TABLE_TOP))) for shapes in bodies])
     return image.astype(int)
 
 

@@ -19,11 +19,6 @@ HEAD, FRONT = CameraSpec("head", 160, 120), CameraSpec("front", 160, 120)
 CHEQUER = Texture(UNSEEN, 98)
 
 
-@pytest.fixture(scope="module")
-def world() -> SapienWorld:
-    return SapienWorld(render=True)
-
-
 def seen(world: SapienWorld, around: Surroundings, camera: CameraSpec = HEAD) -> NDArray[np.int16]:
     """A picture of the two blocks with these surroundings."""
     world.load(dressed(around))

@@ -21,11 +21,6 @@ SCENES = [
 ]
 
 
-@pytest.fixture(scope="module")
-def world() -> SapienWorld:
-    return SapienWorld(render=True)
-
-
 @pytest.mark.parametrize(("task", "level", "mode"), SCENES)
 def test_objects_are_found_where_the_picture_shows_them(
     world: SapienWorld, task: str, level: int, mode: str

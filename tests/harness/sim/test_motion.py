@@ -37,17 +37,11 @@ def test_profile_starts_and_ends_at_rest(change: float) -> None:
 
 
 @given(st.floats(1e-3, 6.0))
-def test_profile_keeps_both_limits(change: float) -> None:
+def test_profile_keeps_both_limits_and_its_rate_is_the_slope_of_its_fraction(change: float) -> None:
     fraction, rate = motion.profile(change)
     step = motion.duration(change) / (len(fraction) - 1)
     assert (rate * change).max() <= 1.0 + 1e-9
     assert np.abs(np.diff(rate * change)).max() <= step * (1.0 + 1e-6)
-
-
-@given(st.floats(1e-3, 6.0))
-def test_profile_rate_is_the_slope_of_its_fraction(change: float) -> None:
-    fraction, rate = motion.profile(change)
-    step = motion.duration(change) / (len(fraction) - 1)
     slope = np.diff(fraction) / step
     assert np.allclose(slope, (rate[1:] + rate[:-1]) / 2, atol=step * 1.01 / change)
 

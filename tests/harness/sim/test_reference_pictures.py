@@ -31,11 +31,6 @@ TOGETHER_AS_ALONE = 45.0
 """[dB]: on one device pictures differ in a few pixels of edges only."""
 
 
-@pytest.fixture(scope="module")
-def world() -> SapienWorld:
-    return SapienWorld(render=True)
-
-
 def drawn(world: SapienWorld, mode: str) -> NDArray[np.uint8]:
     """The scene of this mode as all cameras see it at once, beside each other."""
     world.load(build_scene(*SCENES[mode], mode=mode))

@@ -20,23 +20,7 @@ from robospa.geometry import Pose
 from robospa.harness.replay import ReplayError
 from robospa.harness.robots import embodiment
 from robospa.harness.running.manifest import this_processor, write_manifest
-from robospa.harness.viewer.show import (
-    DrawnBody,
-    DrawnMesh,
-    Moment,
-    Playback,
-    PoseRecorder,
-    Scene3D,
-    as_html,
-    drawn_bodies,
-    meshes,
-    moments,
-    play,
-    playback_of,
-    recorded_playback,
-    serving,
-    trial_named,
-)
+from robospa.harness.viewer import show
 from robospa.results.records.manifest import RunAbout, RunError, RunSettings, make_manifest
 from robospa.results.records.trial_record import TrialRecord
 from robospa.tasks.catalog import build_scene
@@ -61,8 +45,8 @@ def record(success: bool, **changes: object) -> TrialRecord:
     return replace(made, **changes)  # type: ignore[arg-type]
 
 
-def played(success: bool = True) -> Playback:
-    return playback_of(record(success), TIMES, FRAMES, NAMES, SUBTASKS)
+def played(success: bool = True) -> show.Playback:
+    return show.playback_of(record(success), TIMES, FRAMES, NAMES, SUBTASKS)
 
 
 def test_a_time_shows_the_last_frame_at_or_before_it() -> None:
@@ -90,11 +74,11 @@ def test_events_are_words_with_the_objects_names_and_approaches_are_left_out() -
 
 def test_a_failure_stands_at_its_moment_and_one_without_at_the_end() -> None:
     wrong = {"time": 0.2, "kind": "wrong_object", "object": "object_1", "index": -1, "note": ""}
-    found = moments(record(False, events=(wrong,), category="GAC"), NAMES, 0.3)
+    found = show.moments(record(False, events=(wrong,), category="GAC"), NAMES, 0.3)
     assert [(m.time, m.failure) for m in found] == [(0.2, False), (0.2, True)]
     assert found[1].text == "failure: target grounding"
-    (idle,) = moments(record(False, events=(), category="GAC"), NAMES, 0.3)
-    assert idle == Moment(idle.time, "failure: no attempt", failure=True)
+    (idle,) = show.moments(record(False, events=(), category="GAC"), NAMES, 0.3)
+    assert idle == show.Moment(idle.time, "failure: no attempt", failure=True)
 
 
 class Posed(FakeWorld):
@@ -106,7 +90,7 @@ class Posed(FakeWorld):
 
 def test_a_recorded_trial_is_played_again_and_seen(tmp_path: Path) -> None:
     record = recorded(tmp_path / "run", KEYS[0])
-    played = recorded_playback(Posed(), record, tmp_path / "run", parts=parts)
+    played = show.recorded_playback(Posed(), record, tmp_path / "run", parts=parts)
     assert [frame["block"].position[2] for frame in played.frames] == list(played.times)
     assert played.times[0] == 0.0
     assert len(played.times) > 1
@@ -114,7 +98,7 @@ def test_a_recorded_trial_is_played_again_and_seen(tmp_path: Path) -> None:
 
 
 def test_ten_frames_a_second_are_kept() -> None:
-    recorder, world = PoseRecorder(), Posed()
+    recorder, world = show.PoseRecorder(), Posed()
     world.load(parts(KEYS[0]).scene)
     recorder.started(world)
     for poll in range(1, 26):
@@ -129,10 +113,10 @@ def test_a_trial_that_does_not_come_again_is_refused(tmp_path: Path) -> None:
         about = RunAbout(processors=processors)
         write_manifest(tmp_path / "run", make_manifest(RunSettings(), KEYS, about))
         if not processors:
-            recorded_playback(Posed(), record, tmp_path / "run", parts=parts)
+            show.recorded_playback(Posed(), record, tmp_path / "run", parts=parts)
     for claim, words in ((record, "state"), (replace(record, success=False), "success")):
         with pytest.raises(ReplayError, match=f"another {words}"):
-            recorded_playback(Posed(), claim, tmp_path / "run", parts=parts)
+            show.recorded_playback(Posed(), claim, tmp_path / "run", parts=parts)
 
 
 @pytest.mark.sim
@@ -145,7 +129,7 @@ def test_the_simulator_tells_where_links_objects_and_doors_are() -> None:
     world.load(scene)
     seen, snapshot = world.bodies(), world.snapshot()
     assert {name: seen[name] for name in snapshot.poses} == dict(snapshot.poses)
-    moving = {body.name for body in drawn_bodies(scene, robot) if body.pose is None}
+    moving = {body.name for body in show.drawn_bodies(scene, robot) if body.pose is None}
     assert moving <= seen.keys()
     for a, (side, arm) in enumerate(zip(("left", "right"), robot.arms, strict=True)):
         tool = seen[f"{side} {arm.last_link}"] * arm.tool
@@ -163,7 +147,7 @@ RED, WHITE = (1.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 @needs_sapien
 def test_shapes_of_one_colour_are_one_mesh_and_what_only_collides_is_left_out() -> None:
     box = Box((0.1, 0.2, 0.3))
-    red, white = meshes(
+    red, white = show.meshes(
         [
             Shape(box, color=RED),
             Shape(box, color=WHITE),
@@ -191,7 +175,7 @@ def test_a_model_from_a_file_has_the_colours_of_its_picture(tmp_path: Path) -> N
         picture=picture,
     )
     skin = Skin(str(tmp_path / "skin.npz"), scale=(2.0, 1.0, 1.0), pose=Pose((0.0, 0.0, 1.0)))
-    (mesh,) = meshes((), skin)
+    (mesh,) = show.meshes((), skin)
     assert mesh.colors.tolist() == [[10, 20, 30], [0, 0, 0], [0, 0, 0]]
     assert mesh.vertices.tolist() == [[2, 0, 1], [0, 1, 1], [0, 0, 2]]
 
@@ -199,24 +183,24 @@ def test_a_model_from_a_file_has_the_colours_of_its_picture(tmp_path: Path) -> N
 @needs_sapien
 def test_every_robot_and_every_object_of_a_scene_is_drawn() -> None:
     scene = build_scene("Click_Bell_Open_Microwave_Place_Object", 3, 100000)
-    names = [body.name for body in drawn_bodies(scene, embodiment("franka-panda"))]
+    names = [body.name for body in show.drawn_bodies(scene, embodiment("franka-panda"))]
     assert names[0] == "table"
     assert len(set(names)) == len(names)
     assert {item.name for item in scene.objects} <= set(names)
     oven = next(item.name for item in scene.objects if "microwave" in item.asset)
     assert f"{oven} part" in names
-    still = [b for b in drawn_bodies(scene, embodiment("aloha-agilex")) if b.pose is not None]
+    still = [b for b in show.drawn_bodies(scene, embodiment("aloha-agilex")) if b.pose is not None]
     assert [body.name for body in still] == ["table", "stand"]
 
 
 needs_viser = pytest.mark.skipif(find_spec("viser") is None, reason="needs the extra `view`")
 
 CORNERS = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0.2]], np.float32)
-MESH = DrawnMesh(CORNERS, np.array([[0, 1, 2]], np.uint32), np.array([255, 0, 0], np.uint8))
+MESH = show.DrawnMesh(CORNERS, np.array([[0, 1, 2]], np.uint32), np.array([255, 0, 0], np.uint8))
 BODIES = [
-    DrawnBody("table", (MESH,), Pose((0.0, 0.0, 0.7))),
-    DrawnBody("object_0", (MESH,)),
-    DrawnBody("object_1", (MESH,)),
+    show.DrawnBody("table", (MESH,), Pose((0.0, 0.0, 0.7))),
+    show.DrawnBody("object_0", (MESH,)),
+    show.DrawnBody("object_1", (MESH,)),
 ]
 
 
@@ -236,7 +220,7 @@ class FakeScene:
 
 def test_bodies_move_names_stand_above_them_and_wanted_ones_are_marked() -> None:
     fake = FakeScene()
-    scene = Scene3D(fake, played(), BODIES)
+    scene = show.Scene3D(fake, played(), BODIES)
     assert fake.nodes["/0"].position == (0.0, 0.0, 0.7)
     assert fake.nodes["/1/name"].more == ("the red block",)
     assert "/0/name" not in fake.nodes
@@ -252,21 +236,21 @@ def test_bodies_move_names_stand_above_them_and_wanted_ones_are_marked() -> None
 
 @needs_viser
 def test_it_is_served_on_this_machine_plays_and_ends() -> None:
-    with serving(played(), BODIES) as (address, advance):
+    with show.serving(played(), BODIES) as (address, advance):
         assert address.startswith("http://127.0.0.1:")
         with urllib.request.urlopen(address, timeout=10) as answer:
             assert b"<html" in answer.read(2000)
         port = int(address.rpartition(":")[2])
-        with pytest.raises(OSError, match="in use"), serving(played(), BODIES, port):
+        with pytest.raises(OSError, match="in use"), show.serving(played(), BODIES, port):
             raise AssertionError("two servers on one port")
-        play(advance, time.monotonic() + 0.1)
+        show.play(advance, time.monotonic() + 0.1)
     with pytest.raises(OSError):
         urllib.request.urlopen(address, timeout=2)
 
 
 @needs_viser
 def test_a_page_for_itself_holds_the_scene() -> None:
-    assert "<html" in as_html(played(), BODIES)[:2000]
+    assert "<html" in show.as_html(played(), BODIES)[:2000]
 
 
 SLUG = KNOWN[0].key.slug
@@ -275,13 +259,13 @@ TASK = KNOWN[0].key.task
 
 def test_a_trial_goes_by_the_beginning_of_its_name(tmp_path: Path) -> None:
     run = make_run(tmp_path / "run", KNOWN)
-    assert trial_named(run, SLUG).key == KNOWN[0].key
+    assert show.trial_named(run, SLUG).key == KNOWN[0].key
     short = f"{TASK}-L{KNOWN[0].key.level}-{KNOWN[0].key.seed}"
-    assert trial_named(run, short).key == KNOWN[0].key
+    assert show.trial_named(run, short).key == KNOWN[0].key
     with pytest.raises(RunError, match=f"trials are called '{TASK}'; they are {TASK}-L"):
-        trial_named(run, TASK)
+        show.trial_named(run, TASK)
     with pytest.raises(RunError, match=r"no trial with a result is called 'Nothing'; there are \w"):
-        trial_named(run, "Nothing")
+        show.trial_named(run, "Nothing")
 
 
 @pytest.mark.parametrize(
