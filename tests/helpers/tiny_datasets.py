@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from unittest.mock import patch
 
 import numpy as np
@@ -85,10 +86,13 @@ def tiny_dataset(
     folder: Path, layout: str = "lerobot-v3", codec: str = "h264", count: int = 4
 ) -> list[DatasetEpisode]:
     """Packs a data set of `count` episodes into `folder`; returns the episodes."""
-    episodes = [tiny_episode(number, codec) for number in range(count)]
-    files = written(folder / "episodes", episodes)
-    pack(layout, folder, files, MANIFEST)
-    for path in files:
-        path.unlink()
-    (folder / "episodes").rmdir()
+    return packed(folder, [tiny_episode(number, codec) for number in range(count)], layout)
+
+
+def packed(
+    folder: Path, episodes: list[DatasetEpisode], layout: str = "lerobot-v3"
+) -> list[DatasetEpisode]:
+    """Packs a data set of `episodes` into `folder`."""
+    with TemporaryDirectory() as kept:
+        pack(layout, folder, written(Path(kept), episodes), MANIFEST)
     return episodes

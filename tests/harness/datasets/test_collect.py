@@ -8,7 +8,7 @@ import re
 import shutil
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
@@ -43,8 +43,13 @@ def _without_formats(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "read_record", read_record)
 
 
-def run(wanted: Order, resume: bool = False, keep: bool = False) -> CollectionResult | None:
-    return module.make(wanted, FakePool, resume=resume, keep_episodes=keep, say=lambda line: None)
+def run(
+    wanted: Order,
+    resume: bool = False,
+    keep: bool = False,
+    opened: Callable[[int], FakePool] = FakePool,
+) -> CollectionResult | None:
+    return module.make(wanted, opened, resume=resume, keep_episodes=keep, say=lambda line: None)
 
 
 def test_the_first_good_seeds_are_kept_and_the_others_named(tmp_path: Path) -> None:
@@ -98,16 +103,9 @@ def test_what_is_there_is_not_made_again(tmp_path: Path) -> None:
     shutil.copytree(tmp_path / "a/episodes", tmp_path / "b/episodes")
     damaged = EpisodeStore(tmp_path / "b/episodes").path(FIRST, 1_000_002)
     damaged.write_bytes(damaged.read_bytes()[:-40])
-    pools: list[FakePool] = []
-
-    def open_pool(episodes: int) -> FakePool:
-        pools.append(FakePool(episodes))
-        return pools[0]
-
-    module.make(
-        order(tmp_path / "b"), open_pool, resume=True, keep_episodes=True, say=lambda line: None
-    )
-    assert pools[0].made == [1_000_002]
+    pool = FakePool(6)
+    run(order(tmp_path / "b"), resume=True, keep=True, opened=lambda episodes: pool)
+    assert pool.made == [1_000_002]
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
 
 
@@ -124,7 +122,7 @@ def test_a_variant_that_the_expert_does_not_solve_is_named(
 
 def test_neither_the_number_of_workers_nor_their_order_matters(tmp_path: Path) -> None:
     run(order(tmp_path / "a"))
-    module.make(order(tmp_path / "b"), lambda n: FakePool(n, 7), say=lambda line: None)
+    run(order(tmp_path / "b"), opened=lambda episodes: FakePool(episodes, 7))
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
 
 

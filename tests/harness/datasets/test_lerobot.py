@@ -14,7 +14,7 @@ import pytest
 from dataset_fakes import fake_episode
 from numpy.typing import NDArray
 from PIL import Image
-from tiny_datasets import CAMERAS, MANIFEST, SIZE, film_of, painted, tiny_dataset, written
+from tiny_datasets import CAMERAS, SIZE, film_of, packed, painted, tiny_dataset
 
 from robospa.harness.datasets.episode import (
     ARRAYS,
@@ -27,7 +27,6 @@ from robospa.harness.datasets.episode import (
 )
 from robospa.harness.datasets.lerobot import FilmFiles, TableFiles
 from robospa.harness.datasets.manifest import DatasetError
-from robospa.harness.datasets.pack import pack
 from robospa.harness.datasets.pictures import (
     CODECS,
     FPS,
@@ -139,24 +138,22 @@ def test_tables_go_on_in_a_next_file(tmp_path: Path) -> None:
 
 def test_a_data_set_without_pictures_has_the_objects_as_numbers(tmp_path: Path) -> None:
     episodes = [blind_episode(seed) for seed in (1_000_000, 1_000_001)]
-    files = written(tmp_path / "episodes", episodes)
-    pack("lerobot-v3", tmp_path / "set", files, MANIFEST)
-    info = json.loads((tmp_path / "set/meta/info.json").read_text())
+    packed(tmp_path, episodes)
+    info = json.loads((tmp_path / "meta/info.json").read_text())
     assert info["video_path"] is None
     assert {of["dtype"] for of in info["features"].values()} == {"float32", "int64"}
     assert info["features"]["observation.environment_state"]["names"] == list(NAMES)
-    rows = pq.read_table(tmp_path / "set/data")["observation.environment_state"].to_pylist()
+    rows = pq.read_table(tmp_path / "data")["observation.environment_state"].to_pylist()
     wanted = np.concatenate([episode.environment_state for episode in episodes])
     assert (np.array(rows, np.float32) == wanted).all()
-    assert verify(tmp_path / "set", replays=0).problems == ()
+    assert verify(tmp_path, replays=0).problems == ()
 
 
 def test_episodes_with_and_without_the_objects_do_not_go_together(tmp_path: Path) -> None:
     key = TrialKey("Pick_Blocks_Size", 1, 1_000_001, split="train")
     episodes = [blind_episode(1_000_000), replace(fake_episode(key), pictures={})]
-    files = written(tmp_path / "episodes", episodes)
     with pytest.raises(DatasetError, match="environment state"):
-        pack("lerobot-v3", tmp_path / "set", files, MANIFEST)
+        packed(tmp_path, episodes)
 
 
 def blind_episode(seed: int) -> DatasetEpisode:
@@ -302,13 +299,12 @@ def test_film_files_go_on_in_a_next_file(tmp_path: Path) -> None:
 
 
 def assert_equal(one: DatasetEpisode, other: DatasetEpisode) -> None:
-    blank = {name: np.zeros(0) for name in ARRAYS}
-    for name in ARRAYS:
-        a, b = getattr(one, name), getattr(other, name)
-        assert a.dtype == b.dtype and a.tobytes() == b.tobytes(), name
     for name in one.__dataclass_fields__:
-        if name not in blank:
-            assert getattr(one, name) == getattr(other, name), name
+        a, b = getattr(one, name), getattr(other, name)
+        if name in ARRAYS:
+            assert a.dtype == b.dtype and a.tobytes() == b.tobytes(), name
+        else:
+            assert a == b, name
 
 
 @pytest.mark.parametrize("stills", [False, True])

@@ -10,9 +10,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from collect_fakes import contents
 from numpy.typing import NDArray
 from tiny_datasets import MANIFEST as SETTINGS
-from tiny_datasets import SIZE, painted, tiny_dataset, tiny_episode, written
+from tiny_datasets import SIZE, packed, painted, tiny_dataset, tiny_episode, written
 
 from robospa.action_space import ActionSpace
 from robospa.harness.convention_check.episodes import read_episode
@@ -31,13 +32,9 @@ from robospa.harness.datasets.manifest import (
     read_lines,
     read_record,
 )
-from robospa.harness.datasets.pack import FORMATS, files_below, pack
+from robospa.harness.datasets.pack import FORMATS, pack
 from robospa.harness.datasets.verify import verify
 from robospa.observation import CameraSpec
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in files_below(folder)}
 
 
 @pytest.mark.parametrize("layout", FORMATS)
@@ -86,15 +83,14 @@ def test_episodes_that_do_not_go_together_are_refused_in_a_sentence(tmp_path: Pa
     first = tiny_episode(0)
     seen = dict(first.pictures)
     del seen["head"]
-    files = written(tmp_path, [first, replace(tiny_episode(1), pictures=seen)])
     with pytest.raises(DatasetError, match="pictures"):
-        pack("lerobot-v3", tmp_path / "set", files, SETTINGS)
+        packed(tmp_path, [first, replace(tiny_episode(1), pictures=seen)])
     key = replace(first.key, embodiment="franka-panda")
     wide = replace(first, key=key, space=ActionSpace("joint", (6, 6)))
     with pytest.raises(DatasetError, match="franka-panda"):
-        pack("lerobot-v2.1", tmp_path / "set", [files[0], *written(tmp_path, [wide])], SETTINGS)
+        packed(tmp_path, [first, wide], "lerobot-v2.1")
     with pytest.raises(DatasetError, match="no episode"):
-        pack("lerobot-v3", tmp_path / "set", [], SETTINGS)
+        packed(tmp_path, [])
 
 
 def test_memory_does_not_grow_with_the_episodes(
@@ -272,9 +268,8 @@ def test_mistakes_and_midstates_are_replayed_as_what_they_are(tmp_path: Path) ->
     mistake = replace(tiny_episode(0), kind="mistake:drop", success=False, failure="dropped")
     prefix = np.linspace(0, 1, 28, dtype=np.float32).reshape(2, 14) / 3
     midstate = replace(tiny_episode(1), kind="midstate", prefix_action=prefix)
-    episodes = [mistake, midstate]
-    pack("lerobot-v3", tmp_path / "set", written(tmp_path, episodes), SETTINGS)
-    assert verify(tmp_path / "set", replay=Replayed(episodes)).problems == ()
+    episodes = packed(tmp_path, [mistake, midstate])
+    assert verify(tmp_path, replay=Replayed(episodes)).problems == ()
 
 
 # ---------------------- statistics of features: exact where they can be, and within a bin where not

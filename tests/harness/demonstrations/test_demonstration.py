@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 from robot_at_home import at_home
+from world_scenes import block
 
 from robospa.action_space import ActionSpace
-from robospa.geometry import Pose
 from robospa.harness.demonstrations import noise
 from robospa.harness.demonstrations.changed_plans import (
     Displace,
@@ -51,10 +51,9 @@ from robospa.results.failures.labels import label as failure_type
 from robospa.results.records.trial_record import TrialRecord
 from robospa.tasks.catalog import build_scene, task, tasks
 from robospa.tasks.plan import Pick, Place, Press
-from robospa.tasks.scene import Scene, SceneObject
+from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Contact, Snapshot
 from robospa.trial import TrialKey
-from robospa.workcell import TABLE_TOP
 
 SEED = 930_000
 MIXED = (0.3, 0.1, 0.2)
@@ -441,9 +440,7 @@ class AtHome:
 
 
 def workspace() -> Workspace:
-    params = {"half": [0.02] * 3, "color": [1.0, 0.0, 0.0]}
-    block = SceneObject("b", "block", Pose((-0.15, -0.1, TABLE_TOP + 0.02)), params)
-    return at_home("aloha-agilex", block)
+    return at_home("aloha-agilex", block("b", -0.15, -0.1))
 
 
 def way_to_the_block(ws: Workspace, share: float = 1.0) -> motion.Trajectory:

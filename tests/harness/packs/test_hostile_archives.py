@@ -5,6 +5,7 @@ import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -73,37 +74,30 @@ def material(text: str) -> Change:
     return lambda root: (root / THING / "textured.mtl").write_text(rows)
 
 
+MODEL, MARKER = ("can", {"look": 3}), ("objaverse", {"thing": "marker/0"})
+
+
 @pytest.mark.parametrize(
-    ("harm", "sentence"),
+    ("asked", "harm", "sentence"),
     [
-        (loop(f"{CAN}/visual"), "is missing"),
-        (loop(f"{CAN}/model_data3.json"), "is missing"),
-        (node(matrix=[float("nan")] * 16), NOWHERE),
-        (node(scale=[1e308] * 3), NOWHERE),
+        (MODEL, loop(f"{CAN}/visual"), "is missing"),
+        (MODEL, loop(f"{CAN}/model_data3.json"), "is missing"),
+        (MODEL, node(matrix=[float("nan")] * 16), NOWHERE),
+        (MODEL, node(scale=[1e308] * 3), NOWHERE),
+        (MARKER, loop(f"{THING}/coacd_collision.obj"), "cannot be followed: Symlink loop"),
+        (MARKER, loop(f"{THING}/textured.png"), "cannot be followed"),
+        (MARKER, picture(empty_png(30_000, 30_000)), "unreadable picture: Image size"),
+        (MARKER, picture(empty_png(10_000, 16)), "a picture of 10000x16 pixels"),
+        (MARKER, material("../../../../secret.png"), "leads out of the assets' folder"),
     ],
 )
-def test_a_harmed_model_is_refused_in_a_sentence(root: Path, harm: Change, sentence: str) -> None:
+def test_what_is_harmed_is_refused_in_a_sentence(
+    root: Path, asked: tuple[str, dict[str, Any]], harm: Change, sentence: str
+) -> None:
     harm(root)
     with pytest.raises(ArchiveError, match=sentence) as refused:
-        OfficialPack(open_archive(root)).model("can", {"look": 3})
+        OfficialPack(open_archive(root)).model(*asked)
     assert len(str(refused.value)) < 500 and "\n" not in str(refused.value)
-
-
-@pytest.mark.parametrize(
-    ("harm", "sentence"),
-    [
-        (loop(f"{THING}/coacd_collision.obj"), "cannot be followed: Symlink loop"),
-        (loop(f"{THING}/textured.png"), "cannot be followed"),
-        (picture(empty_png(30_000, 30_000)), "unreadable picture: Image size"),
-        (picture(empty_png(10_000, 16)), "a picture of 10000x16 pixels"),
-        (material("../../../../secret.png"), "leads out of the assets' folder"),
-    ],
-)
-def test_a_harmed_thing_is_refused_in_a_sentence(root: Path, harm: Change, sentence: str) -> None:
-    harm(root)
-    with pytest.raises(ArchiveError, match=sentence) as refused:
-        OfficialPack(open_archive(root)).model("objaverse", {"thing": "marker/0"})
-    assert "\n" not in str(refused.value)
 
 
 def test_a_model_without_its_meshes_is_known_before_anything_is_made(tmp_path: Path) -> None:

@@ -44,10 +44,9 @@ ASSETS = ("can", "stapler", "mug", "microwave", "kitchen_pot", "hammer", "bowl")
 @pytest.fixture(scope="module")
 def pack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OfficialPack]:
     folder = tmp_path_factory.mktemp("official")
-    with pytest.MonkeyPatch.context() as patch:
-        root = make_archive(folder / "assets", ASSETS)
-        with official_pack_in(root, folder / "cache", patch):
-            yield archive_pack()
+    root = make_archive(folder / "assets", ASSETS, ("objects", "clutter"))
+    with pytest.MonkeyPatch.context() as patch, official_pack_in(root, folder / "cache", patch):
+        yield archive_pack()
 
 
 def model(pack: OfficialPack, asset: str, look: int = 0) -> ObjectModel:
@@ -181,14 +180,6 @@ COLORED = "Stack_Blocks_Color_Order"
 PACKED = OfficialLayout(True, "none")
 
 
-@pytest.fixture(scope="module")
-def pack_objaverse(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OfficialPack]:
-    folder = tmp_path_factory.mktemp("objaverse")
-    root = make_archive(folder / "assets", ["stapler"], ("objects", "clutter"))
-    with pytest.MonkeyPatch.context() as patch, official_pack_in(root, folder / "cache", patch):
-        yield archive_pack()
-
-
 def official(key: TrialKey) -> Scene:
     return official_world_parts(key, PACKED, {}).scene
 
@@ -197,29 +188,25 @@ def things_in(scene: Scene) -> list[str]:
     return [str(item.params["thing"]) for item in scene.clutter if item.asset == THING]
 
 
-def categories(pack_objaverse: OfficialPack, scene: Scene) -> set[str]:
-    looks = [
-        look for kind in pack_objaverse.clutter(scene) if kind.asset == THING for look in kind.looks
-    ]
+def categories(pack: OfficialPack, scene: Scene) -> set[str]:
+    looks = [look for kind in pack.clutter(scene) if kind.asset == THING for look in kind.looks]
     return {str(look["thing"]).partition("/")[0] for look in looks}
 
 
 def test_the_list_says_which_there_are_and_without_it_all_are(
-    pack_objaverse: OfficialPack, tmp_path: Path
+    pack: OfficialPack, tmp_path: Path
 ) -> None:
-    found = clutter_things(pack_objaverse.archive)
+    found = clutter_things(pack.archive)
     assert found["toothbrush"] == ("0", "12") and {*found} == {
         "bottle", "marker", "plush", "toothbrush"
     }  # fmt: skip
-    assert index(pack_objaverse.archive).clutter == 5
+    assert index(pack.archive).clutter == 5
     archive = open_archive(make_archive(tmp_path, [], ("clutter",)))
     (tmp_path / "objects" / THING / "list.json").unlink()
     assert clutter_things(archive)["toothbrush"] == ("0", "12", "3")
 
 
-def test_a_thing_collides_as_its_hull_and_stands_where_its_file_has_it(
-    pack_objaverse: OfficialPack,
-) -> None:
+def test_a_thing_collides_as_its_hull_and_stands_where_its_file_has_it(pack: OfficialPack) -> None:
     made = object_model(THING, {"thing": "marker/0", "pack": "official"})
     assert len(made.shapes) == 1 and made.size == pytest.approx((0.06, 0.04, 0.06))
     assert made.bottom == pytest.approx(-0.03)
@@ -229,19 +216,15 @@ def test_a_thing_collides_as_its_hull_and_stands_where_its_file_has_it(
         assert skin["picture"].reshape(-1, 4).mean(axis=0)[:3] == pytest.approx((200, 20, 20))
 
 
-def test_look_alikes_unknown_categories_and_colours_are_left_out(
-    pack_objaverse: OfficialPack,
-) -> None:
-    assert categories(pack_objaverse, official(KEY)) == {"bottle", "marker", "toothbrush"}
+def test_look_alikes_unknown_categories_and_colours_are_left_out(pack: OfficialPack) -> None:
+    assert categories(pack, official(KEY)) == {"bottle", "marker", "toothbrush"}
     bottles = build_scene("Put_Bottles_Dustbin", 2, 100_000)
-    assert categories(pack_objaverse, bottles) == {"marker", "toothbrush"}
+    assert categories(pack, bottles) == {"marker", "toothbrush"}
     colors = build_scene(COLORED, 2, 100_000)
-    assert colors_asked(colors) and categories(pack_objaverse, colors) == set()
+    assert colors_asked(colors) and categories(pack, colors) == set()
 
 
-def test_they_lie_in_randomised_scenes_by_the_rules_of_all_clutter(
-    pack_objaverse: OfficialPack,
-) -> None:
+def test_they_lie_in_randomised_scenes_by_the_rules_of_all_clutter(pack: OfficialPack) -> None:
     scenes = [official(TrialKey(KEY.task, 1, seed, mode="randomized")) for seed in range(8)]
     assert len({name for scene in scenes for name in things_in(scene)}) >= 2
     for scene in scenes:
@@ -257,7 +240,7 @@ def test_they_lie_in_randomised_scenes_by_the_rules_of_all_clutter(
     assert official(KEY) == official(KEY)
 
 
-def test_no_other_scene_has_them(pack_objaverse: OfficialPack) -> None:
+def test_no_other_scene_has_them(pack: OfficialPack) -> None:
     clean = TrialKey(KEY.task, 1, 3)
     assert not official(clean).clutter
     lit = official(TrialKey(KEY.task, 1, 3, mode="randomized:light"))
@@ -267,7 +250,7 @@ def test_no_other_scene_has_them(pack_objaverse: OfficialPack) -> None:
 
 
 def test_without_such_things_the_clutter_is_that_of_the_library(
-    pack_objaverse: OfficialPack, monkeypatch: pytest.MonkeyPatch
+    pack: OfficialPack, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("robospa.harness.packs.official.clutter_kinds", lambda *_: ())
     plain = packs.with_pack(task_parts(KEY).scene, "official")
@@ -283,11 +266,9 @@ def test_a_broken_list_is_refused_in_a_sentence(tmp_path: Path, text: str) -> No
 
 
 @pytest.mark.parametrize("thing", ["../../secret/0", "bottle", "bottle/../0", "bottle/9", 3, None])
-def test_what_is_no_thing_of_the_archive_is_refused(
-    pack_objaverse: OfficialPack, thing: object
-) -> None:
+def test_what_is_no_thing_of_the_archive_is_refused(pack: OfficialPack, thing: object) -> None:
     with pytest.raises(ArchiveError, match=r"is no thing of the archive|is missing"):
-        pack_objaverse.model(THING, {"thing": thing})
+        pack.model(THING, {"thing": thing})
 
 
 def test_a_thing_in_the_wrong_unit_is_refused_and_its_files_are_hashed(tmp_path: Path) -> None:
@@ -302,9 +283,7 @@ def test_a_thing_in_the_wrong_unit_is_refused_and_its_files_are_hashed(tmp_path:
 
 
 @pytest.mark.sim
-def test_they_are_drawn_with_their_textures_and_cannot_be_moved(
-    pack_objaverse: OfficialPack,
-) -> None:
+def test_they_are_drawn_with_their_textures_and_cannot_be_moved(pack: OfficialPack) -> None:
     seeds = range(3, 40)
     keys = [TrialKey(KEY.task, 1, seed, mode="randomized:clutter") for seed in seeds]
     scene = next(s for s in map(official, keys) if len(things_in(s)) > 1)

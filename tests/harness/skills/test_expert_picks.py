@@ -69,15 +69,8 @@ def test_what_a_hand_grasps_when_it_stands_it_grasps_when_it_lies() -> None:
 
 def tower_beside() -> Workspace:
     """A Piper, a block, and a tower of three so near that a level hand is in it."""
-    look = {"half": [HALF] * 3, "color": [1.0, 0.0, 0.0]}
-    places = [(0.037, -0.033, 0), (0.0, -0.115, 0), (0.0, -0.115, 1), (0.0, -0.115, 2)]
-    return at_home(
-        "piper",
-        *(
-            SceneObject(f"block_{i}", "block", Pose((x, y, TABLE_TOP + HALF * (1 + 2 * n))), look)
-            for i, (x, y, n) in enumerate(places)
-        ),
-    )
+    tower = (block(f"block_{1 + n}", 0.0, -0.115, HALF, 2 * n * HALF) for n in range(3))
+    return at_home("piper", block("block_0", 0.037, -0.033, HALF), *tower)
 
 
 def test_a_hand_that_goes_on_to_place_leans_before_it_touches_a_tower() -> None:

@@ -17,7 +17,7 @@ from robospa.harness.skills.workspace import Workspace
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.objects import object_model
 from robospa.tasks.plan import Hang, Place, Pour
-from robospa.tasks.scene import Scene, SceneObject
+from robospa.tasks.scene import Scene
 from robospa.workcell import TABLE_TOP, grasp_points
 
 HALF = 0.018
@@ -27,13 +27,11 @@ CALL = Place("held", (0.0, 0.0, HEIGHT))
 
 def opening(asset: str, *beside: float) -> float:
     """Value 0..1 with which a UR5 lets go in the middle, other blocks being so far [m] aside."""
-    look = {"half": [HALF] * 3, "color": [1.0, 0.0, 0.0]}
-    held = SceneObject("held", asset, Pose((0.0, 0.0, HEIGHT)), look if asset == "block" else {})
-    others = [
-        SceneObject(f"other_{i}", "block", Pose((x, 0.0, HEIGHT)), look)
-        for i, x in enumerate(beside)
-    ]
-    ws: Workspace = at_home("ur5-wsg", held, *others)
+    held = block("held", 0.0, 0.0, HALF)
+    if asset != "block":
+        held = replace(held, asset=asset, params={})
+    others = (block(f"other_{i}", x, 0.0, HALF) for i, x in enumerate(beside))
+    ws = at_home("ur5-wsg", held, *others)
     down = look_rotation((0.0, 0.0, -1.0), (1.0, 0.0, 0.0))
     hand = Pose((0.0, 0.0, HEIGHT + ws.hand(1).grip), down)
     return release_opening(ws, 1, hand, hand.inverse() * held.pose, CALL)
