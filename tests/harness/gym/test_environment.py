@@ -11,10 +11,7 @@ gymnasium = pytest.importorskip("gymnasium", reason="Gymnasium comes with the ex
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
 import robospa.gym  # noqa: E402, F401
-from robospa.harness.gym.environment import (  # noqa: E402
-    TaskEnv,
-    env_id,
-)
+from robospa.harness.gym.environment import TaskEnv, env_id  # noqa: E402
 from robospa.harness.settings import SettingsError  # noqa: E402
 from robospa.harness.trial import run_trial  # noqa: E402
 from robospa.protocol.policy import PolicySpec  # noqa: E402

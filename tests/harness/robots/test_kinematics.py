@@ -77,13 +77,10 @@ POSTURES = np.random.default_rng(0).uniform(CHAIN.lower, CHAIN.upper, (100, 6))
 
 @pytest.mark.parametrize("largest", [1.0, 7.0, 999.0])
 def test_sine_and_cosine(largest: float) -> None:
+    assert fixed_order.sine_cosine(0.0) == (0.0, 1.0)
     for angle in np.linspace(-largest, largest, 2001).tolist():
         expected = (math.sin(angle), math.cos(angle))
         assert fixed_order.sine_cosine(angle) == pytest.approx(expected, abs=3e-16)
-
-
-def test_sine_and_cosine_are_exact_at_rest() -> None:
-    assert fixed_order.sine_cosine(0.0) == (0.0, 1.0)
 
 
 def test_the_end_effector_is_where_numpy_has_it() -> None:

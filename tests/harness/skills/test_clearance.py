@@ -21,6 +21,8 @@ from robospa.tasks.plan import Pick, Press
 from robospa.tasks.scene import SceneObject
 from robospa.workcell import TABLE_TOP
 
+DOWN = look_rotation((0.0, 0.0, -1.0), (1.0, 0.0, 0.0))
+
 
 def block(x: float, y: float, z: float, half: float) -> SceneObject:
     look = {"half": [half] * 3, "color": [1.0, 0.0, 0.0]}
@@ -75,14 +77,13 @@ def test_a_press_keeps_the_edges_of_a_wide_hand_off_what_stands_beside() -> None
     # straight down above the cards the hand would stop on the clock
     scene = build_scene("Click_Objects_Order", 4, 900_001)
     ws = at_home("franka-panda", *scene.objects)
-    down = look_rotation((0.0, 0.0, -1.0), (1.0, 0.0, 0.0))
     cards = next(o.name for o in scene.objects if o.asset == "playing_cards")
     rows = next(press(ws, Press(cards, arm="left")))
     side = ws.robot.action_space("joint").arms[0]
     assert edge_depth(ws, 0, rows[:, side.body]).max() == 0.0
     frame = ws.pose(cards) * ws.models[cards].frames["press"]
     x, y, z = frame.position
-    straight, _ = inverse(ws.chains[0], [Pose((x, y, z + ws.hand(0).tip), down)])
+    straight, _ = inverse(ws.chains[0], [Pose((x, y, z + ws.hand(0).tip), DOWN)])
     assert edge_depth(ws, 0, straight)[0] > 0.0
 
 
@@ -116,12 +117,19 @@ def test_the_straight_way_to_a_grasp_stays_off_what_stands_in_front() -> None:
     assert arm_depth(ws, 1, way_in, "bottle").max() <= TOUCH
 
 
-def test_what_no_arm_gets_over_is_gone_around_on_the_robots_side() -> None:
-    down = look_rotation((0.0, 0.0, -1.0), (1.0, 0.0, 0.0))
-    ws = at_home("piper", block(-0.12, -0.02, TABLE_TOP + 0.06, 0.06))
-    start, goal = (ws.solve(0, Pose((x, y, 0.93), down)) for x, y in ((-0.27, -0.02), (0.0, -0.17)))
-    assert start is not None and goal is not None and blocked(ws, 0, start, goal)
+def on_the_way_past(thing: SceneObject) -> tuple[Workspace, Array]:
+    """A Piper whose left arm stands on the left; and its joints in the middle, near the robot."""
+    ws = at_home("piper", thing)
+    start, goal = (ws.solve(0, Pose((x, y, 0.93), DOWN)) for x, y in ((-0.27, -0.02), (0.0, -0.17)))
+    assert start is not None and goal is not None
     ws.joints[0] = start
+    return ws, goal
+
+
+def test_what_no_arm_gets_over_is_gone_around_on_the_robots_side() -> None:
+    ws, goal = on_the_way_past(block(-0.12, -0.02, TABLE_TOP + 0.06, 0.06))
+    start = ws.joints[0]
+    assert blocked(ws, 0, start, goal)
     via = detour(ws, 0, goal)
     assert via is not None
     assert not blocked(ws, 0, start, via) and not blocked(ws, 0, via, goal)
@@ -129,11 +137,7 @@ def test_what_no_arm_gets_over_is_gone_around_on_the_robots_side() -> None:
 
 
 def test_no_detour_leads_out_of_a_thing() -> None:
-    down = look_rotation((0.0, 0.0, -1.0), (1.0, 0.0, 0.0))
-    ws = at_home("piper", block(-0.27, -0.02, TABLE_TOP, 0.3))
-    start, goal = (ws.solve(0, Pose((x, y, 0.93), down)) for x, y in ((-0.27, -0.02), (0.0, -0.17)))
-    assert start is not None and goal is not None
-    ws.joints[0] = start
+    ws, goal = on_the_way_past(block(-0.27, -0.02, TABLE_TOP, 0.3))
     assert detour(ws, 0, goal) is None
 
 

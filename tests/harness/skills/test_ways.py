@@ -20,10 +20,12 @@ from robospa.workcell import TABLE_TOP, grasp_points
 ROBOT = embodiment("aloha-agilex")
 DOWN = (0.5, -0.5, 0.5, 0.5)
 """A gripper that points down, its fingers left and right."""
+TIPS = [gripper.tip for gripper in ROBOT.grippers]
 LEFT, RIGHT = slice(0, 6), slice(7, 13)
 
 
-def workspace() -> Workspace:
+@pytest.fixture
+def ws() -> Workspace:
     return at_home(ROBOT.name)
 
 
@@ -34,9 +36,10 @@ def above(ws: Workspace, arm: int, x: float, y: float = -0.15, z: float = 0.95) 
     return joints
 
 
-def put(ws: Workspace, arm: int, x: float) -> None:
-    """The arm stands out, above `x`."""
+def put(ws: Workspace, arm: int, x: float) -> Array:
+    """The arm stands out, above `x`: all joints then."""
     ws.joints[arm] = above(ws, arm, x)
+    return ws.row()
 
 
 def moving(rows: list[Array], start: Array) -> list[tuple[bool, bool]]:
@@ -45,26 +48,21 @@ def moving(rows: list[Array], start: Array) -> list[tuple[bool, bool]]:
     return [(bool(s[LEFT].any()), bool(s[RIGHT].any())) for s in steps]
 
 
-def test_one_arm_goes_home_while_the_other_sets_out() -> None:
-    ws = workspace()
-    put(ws, 0, -0.2)
-    start = ws.row()
+def test_one_arm_goes_home_while_the_other_sets_out(ws: Workspace) -> None:
+    start = put(ws, 0, -0.2)
     go(ws, 1, above(ws, 1, 0.2), 0.0)
     assert moving(ws.rows, start) == [(True, True)]
     assert np.allclose(ws.rows[-1][LEFT], ROBOT.arms[0].home) and ws.rows[-1][13] == 0.0
 
 
-def test_arms_that_would_meet_move_one_after_the_other() -> None:
-    ws = workspace()
+def test_arms_that_would_meet_move_one_after_the_other(ws: Workspace) -> None:
     put(ws, 0, 0.1)
-    put(ws, 1, 0.22)
-    start = ws.row()
+    start = put(ws, 1, 0.22)
     go(ws, 1, above(ws, 1, -0.05), 0.0)
     assert moving(ws.rows, start) == [(True, False), (False, True)]
 
 
-def test_an_arm_that_holds_something_stays_out() -> None:
-    ws = workspace()
+def test_an_arm_that_holds_something_stays_out(ws: Workspace) -> None:
     put(ws, 0, -0.2)
     ws.held[0] = "cube"
     start = ws.row()
@@ -72,19 +70,16 @@ def test_an_arm_that_holds_something_stays_out() -> None:
     assert moving(ws.rows, start) == [(False, True)]
 
 
-def test_both_arms_go_home_at_once() -> None:
-    ws = workspace()
+def test_both_arms_go_home_at_once(ws: Workspace) -> None:
     put(ws, 0, -0.2)
-    put(ws, 1, 0.2)
-    start = ws.row()
+    start = put(ws, 1, 0.2)
     go_home(ws, (0, 1))
     assert moving(ws.rows, start) == [(True, True)]
     go_home(ws, (0, 1))
     assert len(ws.rows) == 1
 
 
-def test_the_shorter_of_two_ways_waits_at_its_end() -> None:
-    ws = workspace()
+def test_the_shorter_of_two_ways_waits_at_its_end(ws: Workspace) -> None:
     ways = [above(ws, 0, -0.2), above(ws, 0, -0.2, z=0.9)], [above(ws, 1, 0.2)]
     at_once(ws, (lambda: [ws.add(0, j) for j in ways[0]], lambda: ws.add(1, ways[1][0])))
     assert len(ws.rows) == 2
@@ -92,34 +87,27 @@ def test_the_shorter_of_two_ways_waits_at_its_end() -> None:
     assert np.array_equal(ws.rows[1][RIGHT], ways[1][0])
 
 
-def test_a_short_straight_line_is_one_action_a_corner_is_two() -> None:
-    ws = workspace()
-    tips = [ROBOT.grippers[arm].tip for arm in (0, 1)]
-    put(ws, 0, -0.2)
-    start = ws.row()
+def test_a_short_straight_line_is_one_action_a_corner_is_two(ws: Workspace) -> None:
+    start = put(ws, 0, -0.2)
     for z in (0.94, 0.93, 0.92):
         ws.add(0, above(ws, 0, -0.2, z=z))
-    assert len(fewer_waypoints(ws.chains, tips, start, np.stack(ws.rows))) == 1
+    assert len(fewer_waypoints(ws.chains, TIPS, start, np.stack(ws.rows))) == 1
     ws.add(0, above(ws, 0, -0.25, z=0.92))
     rows = np.stack(ws.rows)
-    assert np.array_equal(fewer_waypoints(ws.chains, tips, start, rows), rows[2:])
+    assert np.array_equal(fewer_waypoints(ws.chains, TIPS, start, rows), rows[2:])
 
 
-def test_rests_and_grippers_are_never_left_out() -> None:
-    ws = workspace()
-    tips = [ROBOT.grippers[arm].tip for arm in (0, 1)]
-    put(ws, 0, -0.2)
-    start = ws.row()
+def test_rests_and_grippers_are_never_left_out(ws: Workspace) -> None:
+    start = put(ws, 0, -0.2)
     ws.add(0, above(ws, 0, -0.2, z=0.94))
     ws.add(0)
     ws.add(0, gripper=0.5)
     ws.add(0, above(ws, 0, -0.2, z=0.93))
     rows = np.stack(ws.rows)
-    assert np.array_equal(fewer_waypoints(ws.chains, tips, start, rows), rows)
+    assert np.array_equal(fewer_waypoints(ws.chains, TIPS, start, rows), rows)
 
 
-def test_a_free_way_is_direct() -> None:
-    ws = workspace()
+def test_a_free_way_is_direct(ws: Workspace) -> None:
     put(ws, 0, -0.2)
     travel(ws, 0, above(ws, 0, -0.1))
     assert len(ws.rows) == 1
