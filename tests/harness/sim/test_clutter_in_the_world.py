@@ -18,6 +18,11 @@ PLACE = ("Pick_Blocks_Size", 3, 100_003)
 ORACLE = "robospa.baselines.oracle:create"
 
 
+@pytest.fixture(scope="module")
+def world() -> SapienWorld:
+    return SapienWorld()
+
+
 def test_objects_come_to_rest_where_they_do_without_it(world: SapienWorld) -> None:
     poses = []
     for mode in ("clean", "randomized:clutter"):
