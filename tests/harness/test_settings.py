@@ -158,7 +158,10 @@ def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
         read_settings(tmp_path / "none.toml")
 
 
-@pytest.mark.parametrize("wrong", [{"executor": "slurm"}, {"control": "free"}, {"split": "test"}])
+@pytest.mark.parametrize(
+    "wrong",
+    [{"executor": "slurm"}, {"control": "free"}, {"split": "test"}, {"log": "tensorboard"}],
+)
 def test_values_that_are_no_choice_are_refused(wrong: dict[str, str]) -> None:
     with pytest.raises(SettingsError, match=next(iter(wrong))):
         updated(DEFAULTS, wrong)

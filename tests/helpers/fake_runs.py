@@ -10,7 +10,7 @@ import numpy as np
 from msgspec import to_builtins
 
 from robospa.results.records.manifest import trial_groups
-from robospa.results.records.runs import to_line
+from robospa.results.records.runs import read_file, read_records, to_line
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.run import LoadedRun, load_run
 from robospa.tasks.scene import SUITE
@@ -154,6 +154,17 @@ def make_run(
     said = {"policy": {"spec": {"name": f"model {EVIL}"}}, **(settings or {})}
     about = {"versions": {"robospa": "1.0"}}
     return write(folder, records, more, **{"settings": said, "about": about, **changes})
+
+
+def lines(folder: Path) -> list[TrialRecord]:
+    """All records on disk, those of losses too."""
+    files = sorted((folder / "trials").glob("*.jsonl"))
+    return [record for file in files for record in read_file(file)]
+
+
+def digests(folder: Path) -> dict[TrialKey, tuple[str, str]]:
+    """How every trial of a run ended, and by which actions."""
+    return {k: (r.digest, r.actions_digest) for k, r in read_records(folder).items()}
 
 
 def write_film(path: Path, seconds: int) -> None:

@@ -33,6 +33,7 @@ from robospa.trial import TrialKey
 
 if TYPE_CHECKING:
     from robospa.harness.running.evaluate import Request
+    from robospa.harness.running.worker import WorkerConfig
 
 HERE = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
 DECODER = ActionDecoder(embodiment("aloha-agilex"))
@@ -41,6 +42,20 @@ LIMIT = 20
 SPEC = PolicySpec(name="fake", cameras=(), state="commanded", horizon=4)
 KEYED = replace(SPEC, needs_trial_key=True)
 """Of a policy that goes by the trial's seed."""
+FAKES: dict[str, Any] = {"world": "run_fakes:FakeWorld", "parts": "run_fakes:parts"}
+"""Settings of a run of what is here."""
+
+
+def trial_keys(count: int) -> list[TrialKey]:
+    """Trials of a fake variant."""
+    return [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(count)]
+
+
+def fake_config(folder: Path, policy: str = "run_fakes:FakePolicy", **given: Any) -> "WorkerConfig":
+    """What a worker needs to know in the fake world, unless `given` name another."""
+    from robospa.harness.running.worker import WorkerConfig
+
+    return WorkerConfig(folder, policy, **{**FAKES, **given})
 
 
 @dataclass(frozen=True)
@@ -262,5 +277,5 @@ def request(url: str | list[str], out: Path, trials: int = 2, resume: bool = Fal
 
     given = {"policy": url, "out": out, "trials": trials, "workers": 1, "patience": 1}
     given |= {"tasks": "Pick_Blocks_Size", "levels": "1", "seeds": "100000-100009", "backoff": 0.01}
-    given |= {"world": "run_fakes:FakeWorld", "parts": "run_fakes:parts"}
+    given |= FAKES
     return make_request(updated(EvaluationSettings(), given), resume=resume)

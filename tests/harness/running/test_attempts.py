@@ -1,4 +1,5 @@
-"""What a policy causes counts, and what it may have caused is bounded over all resumes."""
+"""What a policy causes counts, and what it may have caused is bounded over all resumes; one that
+always fails alike or speaks another language is noticed."""
 
 import random
 from collections.abc import Mapping
@@ -8,24 +9,33 @@ from typing import Any
 
 import fault_server
 import pytest
+from fake_runs import lines, trial_record
 from fault_server import ALWAYS, ONCE, FaultyServer
 from msgspec import structs
 from numpy.typing import NDArray
-from run_fakes import FakePolicy, fake_task_of
+from run_fakes import FakePolicy, fake_config, fake_task_of, trial_keys
 
 from robospa.harness.running import manifest
 from robospa.harness.running.atomic_file import run_lock
-from robospa.harness.running.attempts import CUT_OFF, FIRST, loss_record
+from robospa.harness.running.attempts import (
+    CUT_OFF,
+    FIRST,
+    IN_A_ROW,
+    ErrorVerdict,
+    ErrorWatch,
+    ProblemWatch,
+    loss_record,
+)
 from robospa.harness.running.evaluate import Request, RunAborted, evaluate
 from robospa.harness.running.record_store import RecordWriter
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.scheduler import TrialQueue
-from robospa.harness.running.worker import WorkerConfig
 from robospa.protocol.server import ServerThread
 from robospa.protocol.transport import Timeouts
 from robospa.results.lint import lint_run
 from robospa.results.records.manifest import RunAbout, RunError, RunSettings, make_manifest
-from robospa.results.records.runs import Run, read_file, read_run
+from robospa.results.records.runs import Run, read_run
+from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.repeats import fault_rates, was_repeated, worst_case
 from robospa.results.scoring.scores import score_run
 from robospa.trial import TrialKey
@@ -40,14 +50,10 @@ def same_code(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(manifest, "code_hash", lambda: "the same")
 
 
-def keys(count: int) -> list[TrialKey]:
-    return [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(count)]
-
-
 def request(url: str, folder: Path, count: int = 10, resume: bool = False, **more: Any) -> Request:
-    fakes = {"world": "run_fakes:FakeWorld", "parts": "run_fakes:parts"}
-    config = WorkerConfig(folder, url, {"timeouts": TIMES}, **fakes)
-    return Request(config, keys(count), RunOptions(workers=1, backoff=0.01, **more), resume=resume)
+    config = fake_config(folder, url, options={"timeouts": TIMES})
+    options = RunOptions(workers=1, backoff=0.01, **more)
+    return Request(config, trial_keys(count), options, resume=resume)
 
 
 def persevere(url: str, folder: Path, count: int, resumes: int) -> Run:
@@ -141,8 +147,8 @@ def test_a_loss_is_on_disk_before_the_next_attempt(tmp_path: Path) -> None:
     class Looking(FaultyServer):
         def _strikes(self, point: str, seed: int) -> bool:
             if point == "reset" and seed == ALWAYS:
-                lines = [r for p in (tmp_path / "trials").glob("*") for r in read_file(p)]
-                seen.append(sum(r.key.seed == ALWAYS and r.end == "infrastructure" for r in lines))
+                of_it = [record for record in lines(tmp_path) if record.key.seed == ALWAYS]
+                seen.append(sum(record.end == "infrastructure" for record in of_it))
             return super()._strikes(point, seed)
 
     with Looking("first", fault_server.cut) as url:
@@ -151,10 +157,11 @@ def test_a_loss_is_on_disk_before_the_next_attempt(tmp_path: Path) -> None:
 
 
 def test_an_attempt_under_way_is_waited_for_until_its_driver_is_gone(tmp_path: Path) -> None:
-    manifest.write_manifest(tmp_path, make_manifest(RunSettings(), keys(1)))
-    writer = RecordWriter(tmp_path)
-    queue = TrialQueue(keys(1), fake_task_of)
-    writer.write(loss_record(keys(1)[0], "", (CUT_OFF,), queue))
+    keys = trial_keys(1)
+    manifest.write_manifest(tmp_path, make_manifest(RunSettings(), keys))
+    RecordWriter(tmp_path).write(
+        loss_record(keys[0], "", (CUT_OFF,), TrialQueue(keys, fake_task_of))
+    )
     with run_lock(tmp_path):
         assert not read_run(tmp_path).missing and read_run(tmp_path).waiting
     found = read_run(tmp_path)
@@ -165,19 +172,14 @@ def test_an_attempt_under_way_is_waited_for_until_its_driver_is_gone(tmp_path: P
 
 
 def test_a_server_that_is_away_costs_no_attempt_for_ever(tmp_path: Path) -> None:
-    config = WorkerConfig(
-        tmp_path,
-        "ws://127.0.0.1:9",
-        {"timeouts": replace(TIMES, wait=0.0)},
-        world="run_fakes:FakeWorld",
-        parts="run_fakes:parts",
-    )
+    times = {"timeouts": replace(TIMES, wait=0.0)}
+    config = fake_config(tmp_path, "ws://127.0.0.1:9", options=times)
     records: list[Any] = []
     options = RunOptions(backoff=0.01)
-    Runner(config, keys(1), options, records.append).run()
+    Runner(config, trial_keys(1), options, records.append).run()
     (record,) = records
     assert [row.cause for row in record.retries] == ["unreachable"] * 3
-    Runner(config, keys(1), options, records.append, known={record.key: record}).run()
+    Runner(config, trial_keys(1), options, records.append, known={record.key: record}).run()
     assert len(records[1].retries) == 6  # it was tried again
 
 
@@ -248,3 +250,75 @@ def test_a_server_that_stops_the_run_within_a_trial_has_had_an_attempt(tmp_path:
             evaluate(request(url, tmp_path, 1))
         (record,) = read_run(tmp_path).records.values()
     assert [row.cause for row in record.retries] == ["connection_lost"]
+
+
+# ------------------------------------------------------------------ errors and problems in a row
+
+
+def key(seed: int, task: str = "Pick_A") -> TrialKey:
+    return TrialKey(task, 1, seed)
+
+
+def error(seed: int, message: str = "no camera 'wrist'", task: str = "Pick_A") -> TrialRecord:
+    return trial_record(key(seed, task), end="policy_error", message=message)
+
+
+def watch(*records: TrialRecord, known: tuple[TrialRecord, ...] = ()) -> list[ErrorVerdict]:
+    watching = ErrorWatch()
+    watching.know(known)
+    found = [watching.add(record, "ws://a") for record in records]
+    return [verdict for verdict in found if verdict is not None]
+
+
+def test_the_first_trials_of_a_task_stop_the_run_and_are_withdrawn() -> None:
+    records = [
+        error(n, f"the policy answered nan in action {n}, dimension 3") for n in range(FIRST)
+    ]
+    (verdict,) = watch(*records)
+    assert verdict.withdrawn == tuple(records)
+    assert verdict.text.startswith(f"the first {FIRST} trials of Pick_A all ended in the same")
+    assert "nan in action 4" in verdict.text and "--policy-errors count" in verdict.text
+
+
+SOUND, LOST = trial_record(key(99)), trial_record(key(5), end="infrastructure")
+
+
+@pytest.mark.parametrize(
+    ("records", "withdrawn"),
+    [
+        # A task that fails after others that work, one that once ended otherwise, and once more.
+        ([trial_record(key(99, "Pick_B")), *map(error, range(FIRST))], FIRST),
+        ([SOUND, *map(error, range(IN_A_ROW - 1))], None),
+        ([SOUND, *map(error, range(IN_A_ROW))], 0),
+        ([error(n, f"problem {'abcdefgh'[n]}") for n in range(8)], None),
+        ([record for n in range(FIRST) for record in (error(n), LOST)], FIRST),
+    ],
+)
+def test_errors_that_stop_a_run(records: list[TrialRecord], withdrawn: int | None) -> None:
+    """Those of a server that breaks later count; lost trials say nothing of the policy."""
+    found = watch(*records)
+    assert [len(verdict.withdrawn) for verdict in found] == (
+        [] if withdrawn is None else [withdrawn]
+    )
+
+
+def test_errors_after_a_sound_trial_of_an_earlier_driver_do_not_stop_it() -> None:
+    assert watch(*map(error, range(FIRST)), known=(SOUND,)) == []
+
+
+def test_a_run_of_few_trials_a_task_stops_as_well() -> None:
+    (verdict,) = watch(*(error(1, task=f"Pick_{n}") for n in range(FIRST)))
+    assert verdict.text.startswith(f"the first {FIRST} trials all ended")
+    assert len(verdict.withdrawn) == FIRST
+
+
+def test_many_unreachable_actions_are_said_once_after_five_trials() -> None:
+    """Seven trials of 130 actions, nearly all of them out of reach."""
+    watching = ProblemWatch()
+    found = {"unreachable_actions": 128, "first_unreachable": "action 1: left pose"}
+    said = [watching.add(trial_record(key(n), steps=130, diagnostics=found)) for n in range(7)]
+    assert [len(lines) for lines in said] == [0, 0, 0, 0, 1, 0, 0]
+    assert said[4][0].startswith(
+        "warning: in the first 5 trials 640 of 650 actions (98 %) ask for a pose out of reach"
+    )
+    assert "are poses in the world frame" in said[4][0] and "action 1: left pose" in said[4][0]

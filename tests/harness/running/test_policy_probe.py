@@ -1,15 +1,23 @@
-"""One policy for all tasks or one for each, and what a run says about them before it starts."""
+"""One policy for all tasks or one for each, and what a run says about them before it starts; that
+it goes on with the policy that it began with, and with no other behind the same URL."""
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import msgpack
 import numpy as np
 import pytest
-from command_line import robospa
-from run_fakes import SPEC, FakePolicy
+from command_line import eval_words, robospa
+from run_fakes import SPEC, FakePolicy, request
+from standins import OpenPi
 
+from robospa.harness.running import policy_probe
+from robospa.harness.running.evaluate import evaluate
+from robospa.harness.running.executor import RunAborted
 from robospa.harness.running.policy_probe import (
     ProbedPolicy,
     check_fit,
@@ -27,7 +35,7 @@ from robospa.results.records.manifest import RunError
 from robospa.results.records.runs import read_run
 from robospa.trial import TrialKey
 
-pytestmark = pytest.mark.usefixtures("world_asked_here")
+pytestmark = pytest.mark.usefixtures("world_asked_here", "no_second")
 
 KNOWN = {"Pick_A", "Pick_B", "Pick_C", "Pick_D", "Pick_E"}
 KEYS = [TrialKey("Pick_A", 1, 1), TrialKey("Pick_B", 1, 1), TrialKey("Pick_A", 2, 1)]
@@ -107,12 +115,8 @@ def test_instructions_over_the_budget_are_warned_about() -> None:
 
 
 def test_a_record_keeps_that_its_instruction_was_cut() -> None:
-    assert over_budget(replace(SPEC, text_budget=4), "pick the red block") == {
-        "instruction_tokens": 6,
-        "text_budget": 4,
-    }
-    assert over_budget(replace(SPEC, text_budget=6), "pick the red block") is None
-    assert over_budget(SPEC, "pick the red block") is None
+    found = [over_budget(replace(SPEC, text_budget=n), "pick the red block") for n in (4, 6, None)]
+    assert found == [{"instruction_tokens": 6, "text_budget": 4}, None, None]
 
 
 # ---------------------------------------------------------------- from the outside
@@ -129,10 +133,8 @@ class Named(FakePolicy):
         return chunk * 0 if self.spec.name == "lazy" else chunk
 
 
-def evaluate(out: Path, *words: str) -> tuple[int, str]:
-    fakes = ["--world", "run_fakes:FakeWorld", "--parts", "run_fakes:parts", "--workers", "1"]
-    what = ["--levels", "1", "--trials", "2", "--seeds", "100000-100001", "--out", str(out)]
-    done = robospa("eval", *words, *what, *fakes)
+def run(out: Path, *words: object) -> tuple[int, str]:
+    done = robospa(*eval_words(out, "--levels", "1", "--workers", "1", *words, trials=2))
     return done.code, done.err
 
 
@@ -143,20 +145,18 @@ def test_a_checkpoint_for_every_task(tmp_path: Path) -> None:
         ServerThread(policy_factory=lambda: Named("lazy")) as second,
     ):
         path = write(tmp_path, {"Pick_Blocks_Size": first.url, "Pick_Blocks_Height": second.url})
-        words = ["--policy-map", str(path), "--tasks", tasks]
-        code, err = evaluate(tmp_path / "run", *words)
+        code, err = run(tmp_path / "run", "--policy-map", path, "--tasks", tasks)
         assert code == 0, err
         other = write(tmp_path, {"Pick_Blocks_Size": first.url, "Pick_Blocks_Height": first.url})
-        code, err = evaluate(tmp_path / "run", "--policy-map", str(other), "--tasks", tasks,
-                             "--resume")  # fmt: skip
+        code, err = run(tmp_path / "run", "--policy-map", other, "--tasks", tasks, "--resume")
         assert code == 1
         assert "policies.Pick_Blocks_Height.spec.name: 'lazy' -> 'busy'" in err
-    run = read_run(tmp_path / "run")
-    assert {r.key.task: r.success for r in run.records.values()} == {
+    found = read_run(tmp_path / "run")
+    assert {r.key.task: r.success for r in found.records.values()} == {
         "Pick_Blocks_Size": True,
         "Pick_Blocks_Height": False,
     }
-    settings, about = run.manifest.settings, run.manifest.about
+    settings, about = found.manifest.settings, found.manifest.about
     assert settings.policies["Pick_Blocks_Height"].stated.name == "lazy"
     assert about.policies["Pick_Blocks_Size"].target == first.url
 
@@ -164,23 +164,19 @@ def test_a_checkpoint_for_every_task(tmp_path: Path) -> None:
 def test_warnings_and_options_are_printed_and_kept(tmp_path: Path) -> None:
     with ServerThread(policy_factory=lambda: Named("busy")) as server:
         url = server.url.replace("ws://", "openpi://") + "?text_budget=4"
-        words = [url, "--tasks", "Pick_Blocks_Size", "--step-scale", "3"]
-        code, err = evaluate(tmp_path / "run", *words)
+        code, err = run(tmp_path / "run", url, "--step-scale", "3")
         assert code == 0, err
-        again = [url, "--tasks", "Pick_Blocks_Size", "--resume"]
-        code, refusal = evaluate(tmp_path / "run", *again)
+        code, refusal = run(tmp_path / "run", url, "--resume")
         assert code == 1
         assert "step_scale: 3.0 -> 1.0" in refusal
-    assert err.count("warning: adapt_to_pi is invisible") == 1
-    assert err.count("warning: step limits are 3 times the official ones") == 1
-    assert err.count("warning: the model reads 4 tokens of an instruction") == 1
-    run = read_run(tmp_path / "run")
-    kept = run.manifest.about.warnings
-    assert sum("adapt_to_pi" in text for text in kept) == 1
-    assert run.manifest.settings.policy.options["text_budget"] == 4
-    assert run.manifest.settings.step_scale == 3
-    assert all(r.diagnostics["text_budget"] == 4 for r in run.records.values())
-    assert "step-limits" in {finding.rule for finding in lint_run(run)}
+    found = read_run(tmp_path / "run")
+    for text in ("adapt_to_pi is", "step limits are 3 times the", "the model reads 4 tokens of an"):
+        assert err.count(f"warning: {text}") == 1
+        assert sum(text in kept for kept in found.manifest.about.warnings) == 1
+    assert found.manifest.settings.policy.options["text_budget"] == 4
+    assert found.manifest.settings.step_scale == 3
+    assert all(r.diagnostics["text_budget"] == 4 for r in found.records.values())
+    assert "step-limits" in {finding.rule for finding in lint_run(found)}
 
 
 class InMetres(FakePolicy):
@@ -212,3 +208,101 @@ def test_servers_of_two_checkpoints_are_not_one_policy_in_any_dialect() -> None:
         combine_replicas([one, other])
     with pytest.raises(RunError, match=r"metadata\.ckpt is '1' and 'unset'"):
         combine_replicas([one, silent])
+    with pytest.raises(RunError, match="checkpoint is 'step 1000' and 'step 2000'"):
+        combine_replicas([greeting("step 1000"), greeting("step 2000")])
+
+
+# --- another checkpoint
+
+
+@pytest.fixture
+def no_second(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(policy_probe, "SECOND_LOOK", 0.0)
+
+
+@contextmanager
+def served(checkpoint: str, port: int = 0) -> Iterator[ServerThread]:
+    spec = replace(SPEC, checkpoint=checkpoint)
+    with ServerThread(policy_factory=lambda: FakePolicy(spec), port=port) as server:
+        yield server
+
+
+def test_resuming_with_another_checkpoint_is_refused_and_with_the_same_goes_on(
+    tmp_path: Path,
+) -> None:
+    with served("step 1000") as server:
+        port = int(server.url.rpartition(":")[2])
+        evaluate(request(server.url, tmp_path))
+    about = read_run(tmp_path).manifest.about.policy.identity
+    assert about.checkpoint == "step 1000" and len(about.hash) == 16
+    refused = pytest.raises(RunError, match=r"'step 1000' -> 'step 2000'.*another --out")
+    for place in (port, 0):  # where it was, and elsewhere
+        with served("step 2000", place) as server, refused:
+            evaluate(request(server.url, tmp_path, resume=True))
+        with served("step 1000", place) as server:
+            evaluate(request(server.url, tmp_path, resume=True))
+
+
+class Described(OpenPi):
+    """openpi's server with metadata of its own; some of it changes with every connection."""
+
+    def __init__(self, **metadata: Any) -> None:
+        super().__init__()
+        self.metadata, self.greetings = metadata, 0
+
+    def talk(self, socket: Any) -> None:
+        self.greetings += 1
+        socket.send(msgpack.packb({**self.metadata, "served": self.greetings}))
+        while True:
+            socket.recv()
+
+
+def test_metadata_of_other_dialects_tells_checkpoints_apart(tmp_path: Path) -> None:
+    def probed(url: str) -> Any:
+        asked = request(url, tmp_path)
+        found = policy_probe.probe_policies(asked.config, asked.keys)
+        return next(iter(found.values()))
+
+    with Described(checkpoint="a", uptime=3) as url:
+        first, later = probed(url), probed(url)
+    assert first.identity.volatile == {"metadata.served"}
+    assert first.identity.changes(later.identity) == []
+    with Described(checkpoint="b", uptime=3) as url:
+        assert first.identity.changes(probed(url).identity) == [
+            "metadata.checkpoint was 'a' and is 'b'"
+        ]
+
+
+class Swapped(FakePolicy):
+    """Fails in its second trial; from then on its server greets with another checkpoint."""
+
+    checkpoint = "step 1000"
+    trials = 0
+
+    def reset(self, trial: Any) -> None:
+        Swapped.trials += 1
+        if Swapped.trials == 2:
+            Swapped.server._policies.spec = replace(SPEC, checkpoint="step 2000")  # type: ignore[attr-defined]
+            raise RuntimeError("restarting with the new weights")
+        super().reset(trial)
+
+
+def test_another_checkpoint_in_the_middle_stops_the_run(tmp_path: Path) -> None:
+    spec = replace(SPEC, checkpoint="step 1000")
+    with ServerThread(policy_factory=lambda: Swapped(spec)) as server:
+        Swapped.server = server  # type: ignore[attr-defined]
+        with pytest.raises(RunAborted, match="checkpoint was 'step 1000' and is 'step 2000'"):
+            evaluate(request(server.url, tmp_path, trials=4))
+    ends = [record.end for record in read_run(tmp_path).records.values()]
+    assert sorted(ends) == ["policy_error", "success"]
+
+
+def test_lint_notes_that_nothing_says_which_checkpoint_was_served(tmp_path: Path) -> None:
+    for name, checkpoint in (("silent", ""), ("named", "step 1000")):
+        with served(checkpoint) as server:
+            evaluate(request(server.url, tmp_path / name))
+        found = {f.rule: f for f in lint_run(read_run(tmp_path / name))}
+        assert ("unknown-checkpoint" in found) == (not checkpoint)
+        warnings = read_run(tmp_path / name).manifest.about.warnings
+        assert ("which checkpoint" in " ".join(warnings)) == (not checkpoint)
+    assert found.get("unknown-checkpoint") is None

@@ -6,15 +6,17 @@ its nodes comes last.
 
 import os
 import subprocess
-import sys
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 from collect_fakes import FakePool, contents, fake_pack, order
+from command_line import ROBOSPA, eval_words
+from fake_runs import digests, lines
 from ray_helpers import QUIET, SIZE, cluster, kill_node
+from run_fakes import fake_config, trial_keys
 
 from robospa.harness.datasets import collect as collecting
 from robospa.harness.datasets.workers import pool_opener
@@ -22,13 +24,13 @@ from robospa.harness.running.ray_executor import NoCluster, RayExecutor, check_a
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.settings import Compute
-from robospa.results.records.runs import finished, read_file, read_records
+from robospa.results.records.runs import VIDEOS, differences, film_name, finished, read_records
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 pytest.importorskip("ray")
 
-KEYS = [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(30)]
+KEYS = trial_keys(30)
 
 
 @pytest.fixture(scope="module")
@@ -42,18 +44,6 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Any, Any, P
             patch.setenv(name, value)
         with cluster(num_cpus=1) as made:
             yield made, made.add_node(num_cpus=1, env_vars={"FAKE_NODE": "one"}, **SIZE), marks
-
-
-def config(folder: Path, policy: str = "run_fakes:FakePolicy") -> WorkerConfig:
-    return WorkerConfig(folder, policy, world="run_fakes:FakeWorld", parts="run_fakes:parts")
-
-
-def lines(folder: Path) -> list[TrialRecord]:
-    return [r for path in sorted((folder / "trials").glob("*.jsonl")) for r in read_file(path)]
-
-
-def digests(folder: Path) -> dict[TrialKey, tuple[str, str]]:
-    return {k: (r.digest, r.actions_digest) for k, r in read_records(folder).items()}
 
 
 def traces(folder: Path) -> dict[str, bytes]:
@@ -92,16 +82,13 @@ def test_the_slurm_example_is_valid_shell() -> None:
 def test_the_command_gives_the_same_records_as_local_workers_and_no_noise(
     tmp_path: Path, home: tuple[Any, Any, Path]
 ) -> None:
-    words = [sys.executable, "-m", "robospa.harness.cli.main", "eval", "run_fakes:FakePolicy"]
-    words += ["--tasks", "Pick_Blocks_Size", "--levels", "1-3", "--trials", "10"]
-    words += ["--seeds", "100000-100009", "--world", "run_fakes:FakeWorld"]
-    words += ["--parts", "run_fakes:parts", "--out", str(tmp_path / "ray")]
-    words += ["--executor", "ray", "--address", home[0].address]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=200)
+    there = ["--executor", "ray", "--address", home[0].address, "--levels", "1-3"]
+    words = eval_words(tmp_path / "ray", "run_fakes:FakePolicy", *there, trials=10)
+    done = subprocess.run([*ROBOSPA, *words], capture_output=True, text=True, timeout=200)
     assert done.returncode == 0, done.stderr
     assert "ray" not in done.stderr.lower(), done.stderr
     keys = [TrialKey("Pick_Blocks_Size", n, 100000 + s) for n in (1, 2, 3) for s in range(10)]
-    Runner(config(tmp_path / "local"), keys, RunOptions(workers=1)).run()
+    Runner(fake_config(tmp_path / "local"), keys, RunOptions(workers=1)).run()
     assert sorted(r.key for r in lines(tmp_path / "ray") if finished(r)) == keys
     assert digests(tmp_path / "ray") == digests(tmp_path / "local")
     assert traces(tmp_path / "ray") == traces(tmp_path / "local")
@@ -135,15 +122,52 @@ def test_a_node_that_dies_and_one_that_joins_cost_and_double_nothing(
             kill_node(second)
             made.add_node(num_cpus=1, env_vars={"FAKE_NODE": "two"}, **SIZE)
 
-    patient = config(tmp_path / "ray", "ray_helpers:NodePolicy")
+    patient = fake_config(tmp_path / "ray", "ray_helpers:NodePolicy")
     there = Compute(executor="ray", address=made.address)
     with closing(RayExecutor(patient, there, False)) as executor:
         runner = Runner(patient, KEYS, RunOptions(backoff=0.01), on_record)
         runner.executor = executor
         runner.run()
-    Runner(config(tmp_path / "local"), KEYS, RunOptions(workers=1)).run()
+    Runner(fake_config(tmp_path / "local"), KEYS, RunOptions(workers=1)).run()
     results = [r for r in lines(tmp_path / "ray") if finished(r)]
     assert sorted(r.key for r in records) == sorted(r.key for r in results) == KEYS
     assert digests(tmp_path / "ray") == digests(tmp_path / "local")
     assert all([x.cause for x in r.retries] == ["worker_ended"] * (r.attempts - 1) for r in results)
     assert {mark.name for mark in marks.iterdir()} == {"head", "one", "two"}
+
+
+# --- the real simulator on a cluster of its own
+
+
+@pytest.mark.sim
+def test_records_of_a_cluster_equal_local_ones_and_the_cluster_ends_with_the_run(
+    tmp_path: Path,
+) -> None:
+    def config(name: str) -> WorkerConfig:
+        return WorkerConfig(tmp_path / name, "robospa.baselines.oracle:create", video="all")
+
+    keys = [TrialKey("Pick_Blocks_Size", level, 100000) for level in (1, 3)]
+    before = processes("raylet")
+    Runner(config("here"), keys, RunOptions(workers=1)).run()
+    there = config("ray")
+    with closing(RayExecutor(there, Compute(1, "ray", "local"))) as executor:
+        Runner(there, keys, executor=executor).run()
+    here, ray = read_records(tmp_path / "here"), read_records(tmp_path / "ray")
+    assert [differences(here[key], ray[key]) for key in keys] == [[] for _ in keys]
+    for key in keys:
+        trace = f"actions/{key.slug}.npz"
+        assert (tmp_path / "here" / trace).read_bytes() == (tmp_path / "ray" / trace).read_bytes()
+    # Nothing was drawn on the node: films are made where the run's folder is, from what came back.
+    assert not (tmp_path / "ray" / VIDEOS).exists()
+    assert [ray[key].video for key in keys] == [film_name(key) for key in keys]
+    assert processes("raylet") <= before
+
+
+def processes(name: str) -> set[int]:
+    """Those whose program's path ends in `name`."""
+    found = set()
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        with suppress(OSError):
+            if path.read_bytes().split(b"\0")[0].endswith(name.encode()):
+                found.add(int(path.parent.name))
+    return found

@@ -1,17 +1,40 @@
-"""Who is placed where, and what is reported when Ray loses something: without a cluster."""
+"""Who is placed where, and what is reported when Ray loses something, without a cluster; what runs
+on a node, without Ray."""
 
 from __future__ import annotations
 
+import pickle
+import tempfile
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import pytest
+from run_fakes import fake_config, trial_keys
 
 from robospa.harness.running import ray_executor
-from robospa.harness.running.executor import RunAborted, WorkerReady
-from robospa.harness.running.ray_executor import NoCluster, RayExecutor, WorkerReport
-from robospa.harness.running.worker import WorkerConfig
+from robospa.harness.running.executor import (
+    Heartbeat,
+    Message,
+    Proceed,
+    RunAborted,
+    RunTrial,
+    Stop,
+    TrialBegins,
+    TrialDone,
+    WorkerReady,
+)
+from robospa.harness.running.manifest import this_processor
+from robospa.harness.running.ray_executor import (
+    NoCluster,
+    RayExecutor,
+    WorkerActor,
+    WorkerReport,
+    version_differences,
+    versions,
+)
 from robospa.harness.settings import Compute
+from robospa.results.records.trial_record import RetryRow
 
 pytest.importorskip("ray")
 
@@ -92,23 +115,19 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ray_executor, "NODES_SECONDS", 0.0)
 
 
-def executor(
-    monkeypatch: pytest.MonkeyPatch, ray: FakeRay, settings: Compute | None = None
-) -> RayExecutor:
-    monkeypatch.setattr(ray_executor, "join_cluster", lambda address: ray)
-    return RayExecutor(WorkerConfig(Path("run"), "hold"), settings or Compute(executor="ray"))
+def executor(ray: FakeRay, **given: Any) -> RayExecutor:
+    with mock.patch.object(ray_executor, "join_cluster", return_value=ray):
+        return RayExecutor(fake_config(Path("run")), Compute(executor="ray", **given))
 
 
-def test_the_capacity_is_what_fits_and_grows_with_the_cluster(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_capacity_is_what_fits_and_grows_with_the_cluster() -> None:
     ray = FakeRay(small=1.0, large=3.0)
-    made = executor(monkeypatch, ray, Compute(executor="ray", cpus_per_worker=1.5))
+    made = executor(ray, cpus_per_worker=1.5)
     assert made.capacity() == 2
     ray.cpus["new"] = 3.1
     made.wait([], 0.0)
     assert made.capacity() == 4
-    assert executor(monkeypatch, ray, Compute(executor="ray", workers=3)).capacity() == 3
+    assert executor(ray, workers=3).capacity() == 3
 
 
 @pytest.mark.parametrize(
@@ -119,16 +138,14 @@ def test_a_share_of_a_gpu_counts_too(has: dict[str, float], workers: int) -> Non
     assert ray_executor.fitting(has, {"CPU": 1.0, "GPU": 0.1}) == workers
 
 
-def test_a_worker_that_fits_on_no_node_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_worker_that_fits_on_no_node_is_refused() -> None:
     with pytest.raises(NoCluster, match=r"4 CPUs that a worker takes \(the largest has 3 CPUs\)"):
-        executor(
-            monkeypatch, FakeRay(small=1.0, large=3.0), Compute(executor="ray", cpus_per_worker=4.0)
-        )
+        executor(FakeRay(small=1.0, large=3.0), cpus_per_worker=4.0)
 
 
-def test_workers_go_where_most_is_free(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_workers_go_where_most_is_free() -> None:
     ray = FakeRay(small=1.0, large=3.0)
-    made = executor(monkeypatch, ray)
+    made = executor(ray)
     workers = [made.start(name) for name in "abcde"]
     made.wait(workers, 0.0)
     assert sorted(actor.node for actor in ray.actors) == ["large", "large", "large", "small"]
@@ -139,9 +156,9 @@ def test_workers_go_where_most_is_free(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [worker.pending() for worker in workers] == [True] * 5
 
 
-def test_a_node_that_is_unfit_is_left_out_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_node_that_is_unfit_is_left_out_and_named() -> None:
     ray = FakeRay(small=1.0, large=3.0)
-    made = executor(monkeypatch, ray)
+    made = executor(ray)
     worker = made.start("a")
     made.wait([worker], 0.0)
     ray.actors[0].start.calls[0].finish("it has numpy 1 instead of 2")
@@ -161,11 +178,9 @@ def test_a_node_that_is_unfit_is_left_out_and_named(monkeypatch: pytest.MonkeyPa
         (RuntimeError("No module named 'robospa'"), r"do not start there \(No module named"),
     ],
 )
-def test_a_run_whose_nodes_are_all_unfit_cannot_go_on(
-    monkeypatch: pytest.MonkeyPatch, result: Any, text: str
-) -> None:
+def test_a_run_whose_nodes_are_all_unfit_cannot_go_on(result: Any, text: str) -> None:
     ray = FakeRay(only=1.0)
-    made = executor(monkeypatch, ray)
+    made = executor(ray)
     worker = made.start("a")
     made.wait([worker], 0.0)
     ray.actors[0].start.calls[0].finish(result)
@@ -176,7 +191,7 @@ def test_a_run_whose_nodes_are_all_unfit_cannot_go_on(
 
 def test_a_run_without_nodes_waits_for_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
     ray = FakeRay(only=1.0)
-    made = executor(monkeypatch, ray)
+    made = executor(ray)
     ray.cpus.clear()
     made.wait([], 0.0)
     made.wait([], 0.0)
@@ -186,9 +201,9 @@ def test_a_run_without_nodes_waits_for_a_while(monkeypatch: pytest.MonkeyPatch) 
         made.wait([], 0.0)
 
 
-def test_a_worker_that_was_ready_ends_with_its_actor(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_worker_that_was_ready_ends_with_its_actor() -> None:
     ray = FakeRay(only=1.0)
-    made = executor(monkeypatch, ray)
+    made = executor(ray)
     worker = made.start("a")
     made.wait([worker], 0.0)
     (actor,) = ray.actors
@@ -205,9 +220,63 @@ def test_a_worker_that_was_ready_ends_with_its_actor(monkeypatch: pytest.MonkeyP
 
 
 def test_a_cluster_whose_head_does_not_answer_ends_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = executor(monkeypatch, FakeRay(only=1.0))
+    made = executor(FakeRay(only=1.0))
     made._head = "127.0.0.1:1"
     made.wait([], 0.0)
     monkeypatch.setattr(ray_executor, "NO_HEAD_SECONDS", -1.0)
     with pytest.raises(RunAborted, match=r"head of the Ray cluster does not answer: .*refused"):
         made.wait([], 0.0)
+
+
+# --- what runs on a node
+
+
+def test_a_node_with_other_versions_is_named() -> None:
+    assert version_differences(versions()) == ""
+    assert version_differences({"numpy": "0.1"}).endswith("instead of 0.1")
+    assert "unreadable" not in WorkerActor().start({"code": "x"}, b"unreadable", "worker-000")
+
+
+@pytest.fixture
+def actor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> WorkerActor:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    made, given = WorkerActor(), pickle.dumps(fake_config(tmp_path / "elsewhere"))
+    assert made.start(versions(), given, "worker-000") == ""
+    assert received(made) == ([WorkerReady(None, this_processor())], set())
+    return made
+
+
+def received(actor: WorkerActor) -> tuple[list[Message], set[str]]:
+    report = actor.report(60.0)
+    return [m for m in report.messages if not isinstance(m, Heartbeat)], set(report.files)
+
+
+def test_a_worker_hands_over_its_record_and_trace_and_leaves_nothing(
+    actor: WorkerActor, tmp_path: Path
+) -> None:
+    (key,) = trial_keys(1)
+    actor.send(RunTrial(key, "run_fakes:FakePolicy", (RetryRow("deadline"),)))
+    assert received(actor) == ([TrialBegins()], set())
+    actor.send(Proceed())
+    (message,), files = received(actor)
+    assert isinstance(message, TrialDone)
+    assert (message.record.key, message.record.attempts) == (key, 2)
+    assert files == {f"actions/{key.slug}.npz"}
+    (folder,) = tmp_path.iterdir()
+    assert list((folder / "actions").iterdir()) == []
+    actor.send(Stop())
+    assert actor.report(60.0).exit_status == "exit code 0"
+    actor.close()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_worker_that_is_killed_is_reported_with_its_output(
+    actor: WorkerActor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    actor._log.write_bytes(b"x" * 10)
+    monkeypatch.setattr(ray_executor, "LOG_BYTES", 6)
+    assert actor.report(0.0).output == b"x" * 6
+    actor._worker.process.kill()
+    report = actor.report(60.0)
+    assert (report.exit_status, report.output) == ("signal 9", b"x" * 4)
+    actor.close()

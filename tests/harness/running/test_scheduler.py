@@ -1,16 +1,19 @@
-"""Which server gets which trial: driven by a small simulation, without processes or clocks."""
+"""Which server gets which trial, driven by a small simulation without processes or clocks; which
+trial of a base task comes next, and what a trial is expected to take."""
 
 import heapq
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import pytest
 from fake_runs import trial_record
-from run_fakes import fake_task_of
+from run_fakes import LIMIT, fake_task_of, trial_keys
 
-from robospa.harness.running.scheduler import Scheduler, TrialJob, TrialQueue
+from robospa.harness.running.scheduler import Pending, Scheduler, TrialJob, TrialQueue
+from robospa.harness.running.worker import task_finder
+from robospa.harness.worlds import TASK_PARTS
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
@@ -22,13 +25,8 @@ def keys(tasks: Sequence[str] = TASKS, trials: int = 20) -> list[TrialKey]:
     return [TrialKey(task, level, n) for task in tasks for level in (1, 2) for n in range(trials)]
 
 
-def record(key: TrialKey, latency: float, told: Mapping[str, float] | None = None) -> TrialRecord:
-    return trial_record(
-        key,
-        True,
-        wall_time=0.1,
-        latency={"p50": latency, "p95": latency, "p99": latency, "max": latency, **(told or {})},
-    )
+def record(key: TrialKey, latency: float) -> TrialRecord:
+    return trial_record(key, True, wall_time=0.1, latency={"p50": latency})
 
 
 @dataclass
@@ -97,6 +95,12 @@ def equal(*names: str) -> Targets:
     return lambda task: names
 
 
+def next_job(scheduler: Scheduler, now: float = 0.0, at: str = "") -> TrialJob:
+    job = scheduler.next(now, at)
+    assert job is not None
+    return job
+
+
 def switches(simulation: Simulation, target: str) -> int:
     tasks = [job.work.key.task for job in simulation.order if job.target == target]
     return sum(a != b for a, b in pairwise(tasks))
@@ -137,12 +141,9 @@ def test_a_server_that_gets_slow_is_left_and_asked_again_later() -> None:
 
 def test_a_worker_stays_where_it_is_if_the_other_server_is_not_clearly_better() -> None:
     scheduler = schedule(keys(), equal("a", "b"))
-    first = scheduler.next(0.0)
-    assert first is not None
-    second = scheduler.next(0.0)
-    assert second is not None and second.target != first.target
-    third = scheduler.next(0.0, at="b")
-    assert third is not None and third.target == "b"
+    first, second = next_job(scheduler), next_job(scheduler)
+    assert second.target != first.target
+    assert next_job(scheduler, at="b").target == "b"
 
 
 def test_trials_of_a_server_that_goes_away_are_done_by_the_other() -> None:
@@ -170,49 +171,43 @@ def test_a_server_that_comes_back_gets_its_workers_back() -> None:
 
 def test_one_worker_tries_a_server_before_the_others_follow() -> None:
     scheduler = schedule(keys(), equal("a", "b"))
-    job = scheduler.next(0.0)
-    assert job is not None
+    job = next_job(scheduler)
     assert not scheduler.lost(job, 0.0, "unreachable")
     scheduler.requeue(job, 0.0, False)
     pause = scheduler.servers[job.target].retry_at
-    jobs = [scheduler.next(pause) for _ in range(6)]
-    assert [j.target for j in jobs if j is not None].count(job.target) == 1
+    jobs = [next_job(scheduler, pause) for _ in range(6)]
+    assert [j.target for j in jobs].count(job.target) == 1
 
 
 def test_waiting_for_the_only_server_of_a_task_is_charged_when_all_else_is_done() -> None:
     where = {"Pick_A": "a", "Press_B": "b"}
     scheduler = schedule(keys(("Pick_A", "Press_B"), 1), lambda task: (where[task],))
-    jobs = {job.target: job for job in (scheduler.next(0.0), scheduler.next(0.0)) if job}
+    jobs = {job.target: job for job in (next_job(scheduler), next_job(scheduler))}
     assert not scheduler.lost(jobs["a"], 0.0, "unreachable")  # just gone
     scheduler.requeue(jobs["a"], 0.0, False)
-    later = scheduler.next(61.0)
-    assert later is not None and later.target == "a"
+    later = next_job(scheduler, 61.0)
+    assert later.target == "a"
     assert not scheduler.lost(later, 61.0, "unreachable")  # the other server still runs a trial
     scheduler.requeue(later, 61.0, False)
     scheduler.done(jobs["b"], record(jobs["b"].work.key, 1.0), 61.0, 1.0)
-    for _ in range(2):
-        rest = scheduler.next(99.0)
-        assert rest is not None
-        if rest.target == "b":
-            scheduler.done(rest, record(rest.work.key, 1.0), 99.0, 1.0)
-            rest = scheduler.next(99.0)
-            assert rest is not None
-        break
+    rest = next_job(scheduler, 99.0)
+    if rest.target == "b":
+        scheduler.done(rest, record(rest.work.key, 1.0), 99.0, 1.0)
+        rest = next_job(scheduler, 99.0)
     assert rest.target == "a"
     assert scheduler.lost(rest, 99.0, "unreachable")  # nobody else has anything to do
 
 
 def test_a_server_that_came_back_as_another_one_is_left_out() -> None:
     scheduler = schedule(keys(), equal("a", "b"))
-    job = scheduler.next(0.0)
-    assert job is not None
+    job = next_job(scheduler)
     assert not scheduler.lost(job, 0.0, "incompatible", "another spec")
     scheduler.requeue(job, 0.0, False)
     assert scheduler.tasks_without_server() == ()
     assert all(j.target != job.target for _ in range(20) if (j := scheduler.next(1e6)))
     (left,) = (s for s in scheduler.servers.values() if not s.excluded)
-    other = scheduler.next(1e6)
-    assert other is not None and other.target == left.target
+    other = next_job(scheduler, 1e6)
+    assert other.target == left.target
     scheduler.lost(other, 1e6, "incompatible", "another spec, too")
     scheduler.requeue(other, 1e6, False)
     assert set(scheduler.tasks_without_server()) == set(TASKS)
@@ -231,5 +226,59 @@ def test_a_server_with_one_state_for_all_does_one_trial_at_a_time() -> None:
     assert taken.count("ws://free") == 3 and jobs[-1] is None
     first = next(job for job in jobs if job is not None and job.target in shared)
     scheduler.done(first, record(first.work.key, 1.0), 1.0, 1.0)
-    again = scheduler.next(1.0)
-    assert again is not None and again.target in shared
+    assert next_job(scheduler, 1.0).target in shared
+
+
+# --- the queue
+
+KEYS = trial_keys(3)
+
+
+def test_a_retry_waits_for_its_time_and_then_goes_first() -> None:
+    queue = TrialQueue(KEYS, fake_task_of)
+    first = queue.take("Pick_Fake", 0.0)
+    assert first is not None
+    queue.requeue(replace(first, attempt=2), due=5.0)
+    assert queue.next_due(4.0) == 5.0
+    second, third = queue.take("Pick_Fake", 4.0), queue.take("Pick_Fake", 6.0)
+    assert second is not None and third is not None
+    assert (second.key, third.key, third.attempt) == (KEYS[1], first.key, 2)
+
+
+def test_the_level_that_takes_longest_goes_first() -> None:
+    slow, quick = TrialKey("Pick_Fake", 1, 7), TrialKey("Pick_Fake", 2, 7)
+    queue = TrialQueue([slow, quick, replace(slow, seed=8), replace(quick, seed=8)], fake_task_of)
+    assert queue.take("Pick_Fake", 0.0) == Pending(slow)  # equal limits: in order
+    queue.durations.add(slow, 9.0)
+    queue.durations.add(quick, 1.0)
+    assert queue.take("Pick_Fake", 0.0) == Pending(replace(slow, seed=8))
+    assert queue.take("Pick_Fake", 0.0) == Pending(quick)
+
+
+def test_what_is_expected_moves_from_the_step_limit_to_what_was_measured() -> None:
+    queue = TrialQueue(KEYS, fake_task_of)
+    key, other = KEYS[0], TrialKey("Pick_Fake", 3, 1)
+    assert (queue.durations.expect(key), queue.durations.known) == (LIMIT, False)
+    queue.durations.add(key, 10.0)
+    assert queue.durations.expect(key) == pytest.approx(10.0)
+    assert queue.durations.expect(other) == pytest.approx(10.0)  # as many seconds a step
+    queue.durations.add(other, 2.0)
+    assert queue.durations.expect(key) == pytest.approx((10.0 + 6.0) / 2)
+    assert queue.left() == pytest.approx(3 * 8.0)
+
+
+def test_a_task_that_nobody_knows_still_counts() -> None:
+    def unknown(key: TrialKey) -> object:
+        raise KeyError(key.task)
+
+    queue = TrialQueue(KEYS, unknown)
+    assert queue.due(0.0) == {"Pick_Fake": 3.0}
+
+
+def test_the_catalog_is_asked_for_the_task_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    def built(*_: object) -> None:
+        raise AssertionError("a scene was built")
+
+    monkeypatch.setattr("robospa.harness.trial.build_scene", built)
+    found = task_finder(TASK_PARTS)(TrialKey("Put_Bottles_Dustbin", 3, 100000))
+    assert (found.name, found.levels[3].subtasks) == ("Put_Bottles_Dustbin", 3)

@@ -1,4 +1,5 @@
-"""Where the time goes, and who holds the others up, in words."""
+"""Where the time goes and who holds the others up, in words; more workers than cores only as long
+as that helps; what is logged elsewhere."""
 
 from __future__ import annotations
 
@@ -9,19 +10,21 @@ from typing import Any
 
 import pytest
 from fake_runs import make_run, shown, trial_record
+from run_fakes import FAKES
 
 import robospa
 from robospa.extras import MissingPackage
 from robospa.harness.running.status import (
+    Autoscaler,
     ServerStats,
     Status,
     TimeBreakdown,
+    most_workers,
     server_text,
     shares_text,
     time_left,
 )
 from robospa.harness.running.tracking import WandbTracker
-from robospa.harness.settings import SettingsError
 from robospa.trial import TrialKey
 
 KEY = TrialKey("Pick_Fake", 1, 1)
@@ -181,17 +184,63 @@ def test_trials_that_wait_for_each_other_do_not_fill_the_cores() -> None:
     assert found.workers_text == "2 workers on 2 cores"
 
 
+# --- how many workers there are
+
+
+def run_round(scaler: Autoscaler, waiting: float, trials: int | None = None) -> None:
+    """A round of trials of 1 s each in which a process did nothing for `waiting`."""
+    record = trial_record(KEY, True, timing={"processor": 1.0 - waiting})
+    for _ in range(trials or scaler.target):
+        scaler.add(record)
+
+
+@pytest.mark.parametrize(
+    ("waiting", "saturated", "more"),
+    [(0.05, False, 0), (0.4, False, 1), (0.07, False, 0), (0.95, True, 0)],
+)
+def test_workers_that_wait_for_a_server_with_room_leave_room_for_others(
+    waiting: float, saturated: bool, more: int
+) -> None:
+    scaler = Autoscaler(2, 16, cores=2)
+    run_round(scaler, waiting)
+    assert scaler.scale_up(saturated) == more
+
+
+def test_they_come_in_steps_up_to_the_most() -> None:
+    scaler = Autoscaler(2, 10, cores=2)
+    grown = []
+    for _ in range(5):
+        run_round(scaler, 0.95)
+        scaler.scale_up(saturated=False)
+        grown.append(scaler.target)
+    assert grown == [4, 8, 10, 10, 10]
+
+
+def test_a_review_takes_a_whole_round() -> None:
+    scaler = Autoscaler(4, 16, cores=4)
+    run_round(scaler, 0.9, trials=3)
+    assert scaler.scale_up(saturated=False) == 0
+    run_round(scaler, 0.9, trials=1)
+    assert scaler.scale_up(saturated=False) > 0
+
+
+def test_memory_and_cores_bound_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robospa.harness.running.status.cores", lambda: 4)
+    monkeypatch.setattr("pathlib.Path.read_text", lambda self: "MemAvailable: 8000000 kB\n")
+    assert most_workers() == 10
+    monkeypatch.setattr("pathlib.Path.read_text", lambda self: "MemAvailable: 900000000 kB\n")
+    assert most_workers() == 32
+    monkeypatch.setattr("pathlib.Path.read_text", lambda self: "MemAvailable: 1000 kB\n")
+    assert most_workers() == 4
+
+
 # -------------------------------- `--log wandb`, against a W&B that only remembers what it was told
 
 
-FAKES: dict[str, Any] = {
-    "world": "run_fakes:FakeWorld",
-    "parts": "run_fakes:parts",
-    "tasks": "Pick_Blocks_Size",
-    "levels": 1,
-    "seeds": "100000-100001",
-    "trials": 2,
-    "workers": 1,
+RUN: dict[str, Any] = {
+    **FAKES,
+    **{"tasks": "Pick_Blocks_Size", "levels": 1, "seeds": "100000-100001"},
+    **{"trials": 2, "workers": 1},
 }
 
 
@@ -249,19 +298,17 @@ def test_a_tracker_that_fails_costs_no_trial(
 ) -> None:
     fake = FakeWandb(broken="log")
     monkeypatch.setitem(sys.modules, "wandb", fake)
-    run = robospa.evaluate("run_fakes:FakePolicy", out=tmp_path, log="wandb", **FAKES)
+    run = robospa.evaluate("run_fakes:FakePolicy", out=tmp_path, log="wandb", **RUN)
     assert len(run.records) == 2 and not run.missing
     said = capfd.readouterr().err
     assert said.count("nothing more is logged") == 1 and "no network" in said
     assert fake.started[0]["config"]["policy"]["spec"]["name"] == "fake"
 
 
-def test_what_cannot_be_is_refused_before_anything_is_written(
+def test_a_missing_package_is_named_before_anything_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with pytest.raises(SettingsError, match="log 'tensorboard' is not one of none, wandb"):
-        robospa.evaluate("hold", out=tmp_path / "run", log="tensorboard", **FAKES)
     monkeypatch.setitem(sys.modules, "wandb", None)
     with pytest.raises(MissingPackage, match=r"wandb is not installed.*\[wandb\]'"):
-        robospa.evaluate("hold", out=tmp_path / "run", log="wandb", **FAKES)
+        robospa.evaluate("hold", out=tmp_path / "run", log="wandb", **RUN)
     assert not (tmp_path / "run").exists()
