@@ -10,7 +10,7 @@ import numpy as np
 from msgspec import to_builtins
 
 from robospa.results.records.manifest import trial_groups
-from robospa.results.records.runs import read_file, read_records, to_line
+from robospa.results.records.runs import finished, read_file, read_records, to_line
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.run import LoadedRun, load_run
 from robospa.tasks.scene import SUITE
@@ -160,6 +160,11 @@ def lines(folder: Path) -> list[TrialRecord]:
     """All records on disk, those of losses too."""
     files = sorted((folder / "trials").glob("*.jsonl"))
     return [record for file in files for record in read_file(file)]
+
+
+def results(folder: Path) -> list[TrialRecord]:
+    """Those of them that count."""
+    return [record for record in lines(folder) if finished(record)]
 
 
 def digests(folder: Path) -> dict[TrialKey, tuple[str, str]]:

@@ -7,8 +7,6 @@ import itertools
 import json
 import os
 import signal
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator, Mapping
@@ -17,44 +15,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command_line import robospa
+from command_line import eval_words, robospa, start
+from fake_runs import results
 from numpy.typing import NDArray
 from run_fakes import FakePolicy, NanPolicy
 
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread
-from robospa.results.records.runs import finished, read_file, read_run
-from robospa.results.records.trial_record import TrialRecord
+from robospa.results.records.runs import read_run
 
 quickly = pytest.mark.usefixtures("world_asked_here")
-ROBOSPA = [sys.executable, "-m", "robospa.harness.cli.main"]
-
-
-def words_of(url: str, out: Path, *more: str, trials: int = 4) -> list[str]:
-    """The words after `robospa` of a run in the fake world."""
-    fakes = ["--world", "run_fakes:FakeWorld", "--parts", "run_fakes:parts"]
-    what = ["--tasks", "Pick_Blocks_Size", "--levels", "1-2", "--trials", str(trials)]
-    seeds = ["--seeds", f"100000-{100000 + trials - 1}", "--backoff", "0.05"]
-    workers = ["--workers", str(min(2, trials))]
-    return ["eval", url, *what, *seeds, *workers, *fakes, "--out", str(out), *more]
-
-
-def start(words: list[str]) -> subprocess.Popen[str]:
-    """A process group of its own, so that Ctrl-C can reach all of it as in a terminal."""
-    environment = {**os.environ, "NO_COLOR": "1"}
-    return subprocess.Popen(
-        [*ROBOSPA, *words],
-        env=environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-
-
-def lines(folder: Path) -> list[TrialRecord]:
-    files = sorted((folder / "trials").glob("*.jsonl"))
-    return [r for path in files for r in read_file(path) if finished(r)]
 
 
 class Gate:
@@ -86,7 +56,7 @@ class Gate:
 
 def test_a_server_is_evaluated_and_reported(tmp_path: Path) -> None:
     with ServerThread(policy_factory=FakePolicy) as server:
-        process = start(words_of(server.url, tmp_path / "run"))
+        process = start(eval_words(tmp_path / "run", server.url))
         out, err = process.communicate(timeout=120)
     assert process.returncode == 0, err
     assert "Pick Blocks Size" in out
@@ -102,11 +72,11 @@ def test_a_server_is_evaluated_and_reported(tmp_path: Path) -> None:
 @quickly
 def test_a_nonsense_answer_is_the_policys_failure(tmp_path: Path) -> None:
     with ServerThread(policy_factory=NanPolicy) as server:
-        code, out, err = robospa(*words_of(server.url, tmp_path / "run", trials=1))
+        code, out, err = robospa(*eval_words(tmp_path / "run", server.url, trials=1))
     assert code == 1
     assert "policy error 2: the policy answered nan in action 1, dimension 3" in out
     assert "2 of 2 trials ended in a policy error" in err
-    records = lines(tmp_path / "run")
+    records = results(tmp_path / "run")
     assert [r.end for r in records] == ["policy_error"] * 2
     assert "action 1" in records[0].message
 
@@ -120,7 +90,7 @@ def test_a_server_that_is_too_slow_leaves_trials_missing(tmp_path: Path) -> None
 
     with ServerThread(policy_factory=Asleep) as server:
         more = ["--first-timeout", "0.1", "--attempts", "2"]
-        code, out, err = robospa(*words_of(server.url, tmp_path / "run", *more, trials=1))
+        code, out, err = robospa(*eval_words(tmp_path / "run", server.url, *more, trials=1))
     assert code == 1
     assert "2 of 2 trials could not be run and are missing" in err
     assert "missing" in out
@@ -133,7 +103,7 @@ def test_a_server_that_goes_away_and_comes_back_costs_nothing(tmp_path: Path) ->
     gate = Gate()
     server = ServerThread(policy_factory=gate.policy).start()
     port = int(server.url.rpartition(":")[2])
-    process = start(words_of(server.url, tmp_path / "run", "--attempts", "9", trials=20))
+    process = start(eval_words(tmp_path / "run", server.url, "--attempts", "9", trials=20))
     assert gate.reached.wait(60)
     server.stop()
     with ServerThread(policy_factory=FakePolicy, port=port):
@@ -157,7 +127,7 @@ def heeds_ctrl_c() -> Iterator[None]:
 def test_ctrl_c_leaves_a_run_that_can_be_resumed(tmp_path: Path) -> None:
     gate = Gate()
     with ServerThread(policy_factory=gate.policy) as server:
-        words = words_of(server.url, tmp_path / "run", trials=60)
+        words = eval_words(tmp_path / "run", server.url, trials=60)
         process = start(words)
         assert gate.reached.wait(60)
         os.killpg(process.pid, signal.SIGINT)
@@ -179,9 +149,8 @@ def test_ctrl_c_leaves_a_run_that_can_be_resumed(tmp_path: Path) -> None:
 
         code, _, err = robospa(*words, "--resume")
     assert code == 0, err
-    records = lines(tmp_path / "run")
+    records = results(tmp_path / "run")
     assert len(records) == len({r.key for r in records}) == 120
-    assert all(finished(r) for r in records)
 
 
 @pytest.mark.parametrize(
@@ -207,7 +176,7 @@ def test_every_refusal_is_one_sentence_and_writes_nothing(
     tmp_path: Path, words: list[str], sentence: str
 ) -> None:
     out = tmp_path / "run"
-    code, _, err = robospa(*words_of(words[0], out, *words[1:]))
+    code, _, err = robospa(*eval_words(out, *words))
     assert code == 1 and sentence in err
     assert len(err.strip().splitlines()) == 1
     assert not out.exists()
@@ -216,7 +185,9 @@ def test_every_refusal_is_one_sentence_and_writes_nothing(
 @quickly
 def test_a_run_is_repeated_from_the_settings_that_it_keeps(tmp_path: Path) -> None:
     first, again = tmp_path / "first", tmp_path / "again"
-    code, _, err = robospa(*words_of("run_fakes:FakePolicy", first, trials=2), "--token", "secret")
+    code, _, err = robospa(
+        *eval_words(first, "run_fakes:FakePolicy", "--token", "secret", trials=2)
+    )
     assert code == 0, err
     kept = first / "settings.toml"
     assert "secret" not in kept.read_text()
@@ -241,9 +212,9 @@ def test_seeds_from_a_file_and_scores_as_json(tmp_path: Path) -> None:
     path = tmp_path / "seeds.json"
     path.write_text(json.dumps({"Pick_Blocks_Size": {"1": [7], "2": [9]}}))
     more = ("--seeds", str(path), "--json")
-    code, out, err = robospa(*words_of("run_fakes:FakePolicy", tmp_path / "run", *more, trials=1))
+    code, out, err = robospa(*eval_words(tmp_path / "run", "run_fakes:FakePolicy", *more, trials=1))
     assert code == 0, err
     found = json.loads(out)
     assert (found["folder"], found["trials"], found["missing"]) == (str(tmp_path / "run"), 2, 0)
     assert found["tasks"]["Pick_Blocks_Size"]["sr"][0] == 1.0
-    assert sorted((r.key.level, r.key.seed) for r in lines(tmp_path / "run")) == [(1, 7), (2, 9)]
+    assert sorted((r.key.level, r.key.seed) for r in results(tmp_path / "run")) == [(1, 7), (2, 9)]

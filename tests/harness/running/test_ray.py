@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from collect_fakes import FakePool, contents, fake_pack, order
 from command_line import ROBOSPA, eval_words
-from fake_runs import digests, lines
+from fake_runs import digests, results
 from ray_helpers import QUIET, SIZE, cluster, kill_node
 from run_fakes import fake_config, trial_keys
 
@@ -24,7 +24,7 @@ from robospa.harness.running.ray_executor import NoCluster, RayExecutor, check_a
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.settings import Compute
-from robospa.results.records.runs import VIDEOS, differences, film_name, finished, read_records
+from robospa.results.records.runs import VIDEOS, differences, film_name, read_records
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
@@ -89,7 +89,7 @@ def test_the_command_gives_the_same_records_as_local_workers_and_no_noise(
     assert "ray" not in done.stderr.lower(), done.stderr
     keys = [TrialKey("Pick_Blocks_Size", n, 100000 + s) for n in (1, 2, 3) for s in range(10)]
     Runner(fake_config(tmp_path / "local"), keys, RunOptions(workers=1)).run()
-    assert sorted(r.key for r in lines(tmp_path / "ray") if finished(r)) == keys
+    assert sorted(r.key for r in results(tmp_path / "ray")) == keys
     assert digests(tmp_path / "ray") == digests(tmp_path / "local")
     assert traces(tmp_path / "ray") == traces(tmp_path / "local")
 
@@ -129,10 +129,10 @@ def test_a_node_that_dies_and_one_that_joins_cost_and_double_nothing(
         runner.executor = executor
         runner.run()
     Runner(fake_config(tmp_path / "local"), KEYS, RunOptions(workers=1)).run()
-    results = [r for r in lines(tmp_path / "ray") if finished(r)]
-    assert sorted(r.key for r in records) == sorted(r.key for r in results) == KEYS
+    found = results(tmp_path / "ray")
+    assert sorted(r.key for r in records) == sorted(r.key for r in found) == KEYS
     assert digests(tmp_path / "ray") == digests(tmp_path / "local")
-    assert all([x.cause for x in r.retries] == ["worker_ended"] * (r.attempts - 1) for r in results)
+    assert all([x.cause for x in r.retries] == ["worker_ended"] * (r.attempts - 1) for r in found)
     assert {mark.name for mark in marks.iterdir()} == {"head", "one", "two"}
 
 

@@ -15,16 +15,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command_line import robospa
+from command_line import eval_words, robospa, start
+from fake_runs import digests, lines, results
 from numpy.typing import NDArray
-from run_fakes import SPEC, FakePolicy
+from run_fakes import SPEC, FakePolicy, fake_config, trial_keys
 
 from robospa.harness.running.executor import RunAborted
 from robospa.harness.running.runner import Runner, RunOptions
-from robospa.harness.running.worker import WorkerConfig
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread
-from robospa.results.records.runs import finished, read_file, read_records, read_run, under_way
+from robospa.results.records.runs import finished, read_records, read_run, under_way
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
@@ -32,8 +32,7 @@ KILLS = int(os.environ.get("ROBOSPA_KILLS", "2"))
 QUICK = RunOptions(workers=2, backoff=0.01)
 
 
-def keys(count: int = 8) -> list[TrialKey]:
-    return [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(count)]
+KEYS = trial_keys(8)
 
 
 def go(
@@ -41,32 +40,21 @@ def go(
 ) -> tuple[list[TrialRecord], list[str]]:
     records: list[TrialRecord] = []
     notes: list[str] = []
-    config = WorkerConfig(
-        folder, f"run_fakes:{policy}", world="run_fakes:FakeWorld", parts="run_fakes:parts"
-    )
+    config = fake_config(folder, f"run_fakes:{policy}")
     Runner(config, trials, options, records.append, notes.append).run()
     return records, notes
 
 
-def results(folder: Path) -> list[TrialRecord]:
-    files = sorted((folder / "trials").glob("*.jsonl"))
-    return [r for path in files for r in read_file(path) if finished(r)]
-
-
-def digests(folder: Path) -> dict[TrialKey, tuple[str, str]]:
-    return {k: (r.digest, r.actions_digest) for k, r in read_records(folder).items()}
-
-
 def test_every_trial_is_run_once_and_alike_with_one_worker_or_two(tmp_path: Path) -> None:
-    go(tmp_path / "one", "FakePolicy", keys(), RunOptions(workers=1))
-    go(tmp_path / "two", "FakePolicy", keys(), RunOptions(workers=2))
+    go(tmp_path / "one", "FakePolicy", KEYS, RunOptions(workers=1))
+    go(tmp_path / "two", "FakePolicy", KEYS, RunOptions(workers=2))
     assert digests(tmp_path / "one") == digests(tmp_path / "two")
-    assert sorted(r.key for r in results(tmp_path / "two")) == keys()
+    assert sorted(r.key for r in results(tmp_path / "two")) == KEYS
 
 
 def test_a_server_that_stays_away_stops_the_run(tmp_path: Path) -> None:
     with pytest.raises(RunAborted, match="3 trials in a row"):
-        go(tmp_path, "GonePolicy", keys(8), RunOptions(attempts=1, give_up=3))
+        go(tmp_path, "GonePolicy", KEYS, RunOptions(attempts=1, give_up=3))
 
 
 def test_a_model_that_cannot_be_made_is_not_tried_twice(tmp_path: Path) -> None:
@@ -82,21 +70,21 @@ def test_dead_and_stuck_workers_are_replaced(
 ) -> None:
     monkeypatch.setenv("FAKE_MARKS", str(tmp_path))
     options = RunOptions(workers=2, backoff=0.01, trial_seconds=4.0)
-    records, notes = go(tmp_path, "SuicidalPolicy", keys(), options)
-    assert sorted(r.key for r in records) == keys()
+    records, notes = go(tmp_path, "SuicidalPolicy", KEYS, options)
+    assert sorted(r.key for r in records) == KEYS
     assert all(r.success for r in records)
     assert any("signal 9" in note for note in notes)
     assert any("was stuck for 4 s" in note for note in notes)
 
 
 def test_a_record_on_disk_counts_although_its_worker_died_before_saying_so(tmp_path: Path) -> None:
-    records, _ = go(tmp_path, "LastWordsPolicy", keys())
-    assert sorted(r.key for r in records) == sorted(r.key for r in results(tmp_path)) == keys()
+    records, _ = go(tmp_path, "LastWordsPolicy", KEYS)
+    assert sorted(r.key for r in records) == sorted(r.key for r in results(tmp_path)) == KEYS
 
 
 def test_a_policy_that_does_not_exist_stops_the_run(tmp_path: Path) -> None:
     with pytest.raises(RunAborted, match="run_fakes:Nobody"):
-        go(tmp_path, "Nobody", keys(1))
+        go(tmp_path, "Nobody", KEYS[:1])
 
 
 DRIVER = """
@@ -104,19 +92,15 @@ import sys
 from pathlib import Path
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.atomic_file import run_lock
-from robospa.harness.running.worker import WorkerConfig
 from robospa.results.records.runs import finished, read_records
-from robospa.results.records.trial_record import TrialKey
+from run_fakes import fake_config, trial_keys
 
-if __name__ == "__main__":
-    folder = Path(sys.argv[1])
-    config = WorkerConfig(folder, "run_fakes:CountedPolicy", world="run_fakes:FakeWorld",
-                          parts="run_fakes:parts")
-    keys = [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(int(sys.argv[2]))]
-    with run_lock(folder):
-        known = read_records(folder)
-        owed = [k for k in keys if not finished(known.get(k))]
-        Runner(config, owed, RunOptions(attempts=10), known=known).run()
+folder = Path(sys.argv[1])
+config = fake_config(folder, "run_fakes:CountedPolicy")
+with run_lock(folder):
+    known = read_records(folder)
+    owed = [k for k in trial_keys(int(sys.argv[2])) if not finished(known.get(k))]
+    Runner(config, owed, RunOptions(attempts=10), known=known).run()
 """
 
 
@@ -145,14 +129,13 @@ def test_killing_the_driver_loses_and_doubles_nothing_and_counts_as_an_attempt(
 
 
 TASKS = ("Pick_Blocks_Size", "Pick_Blocks_Height", "Pick_Cans_Relational")
-FAKES = ["--world", "run_fakes:FakeWorld", "--parts", "run_fakes:parts"]
 
 
-class Site:
+class Site(ServerThread):
     """One server, which remembers the task of every trial that began there; `after` is what its
     answers wait for."""
 
-    def __init__(self, name: str = "fake", delay: float = 0.0, **spec: Any) -> None:
+    def __init__(self, name: str = "fake", delay: float = 0.0, **changes: Any) -> None:
         self.tasks: list[str] = []
         self.begun = threading.Event()
         self.after: threading.Event | None = None
@@ -171,42 +154,20 @@ class Site:
                     threading.Event().wait(delay)
                 return super().infer(observation)
 
-        self.server = ServerThread(policy_factory=lambda: Noting(replace(SPEC, name=name, **spec)))
-
-    def __enter__(self) -> Site:
-        self.server.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.server.stop()
-
-    @property
-    def url(self) -> str:
-        return self.server.url
+        spec = replace(SPEC, name=name, **changes)
+        super().__init__(policy_factory=lambda: Noting(spec))
 
     @property
     def switches(self) -> int:
         return sum(a != b for a, b in pairwise(self.tasks))
 
 
-def words(out: Path, *more: str, tasks: tuple[str, ...] = TASKS, trials: int = 4) -> list[str]:
-    what = ["--tasks", ",".join(tasks), "--levels", "1-2", "--trials", str(trials)]
-    seeds = ["--seeds", f"100000-{100000 + trials - 1}", "--backoff", "0.05", "--workers", "2"]
-    return ["eval", *what, *seeds, *FAKES, "--out", str(out), *more]
+def words(out: Path, *more: str, trials: int = 4) -> list[str]:
+    return eval_words(out, "--tasks", ",".join(TASKS), *more, trials=trials)
 
 
-def start(command: list[str]) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, "-m", "robospa.harness.cli.main", *command],
-        env=dict(os.environ),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-
-
-def run(command: list[str]) -> str:
-    process = start(command)
+def ended(process: subprocess.Popen[str]) -> str:
+    """What it said until it ended well."""
     err = process.communicate(timeout=120)[1]
     assert process.returncode == 0, err
     return err
@@ -221,7 +182,7 @@ def refused(command: list[str]) -> str:
 def test_two_servers_share_a_run_and_each_keeps_its_task(tmp_path: Path) -> None:
     with Site(delay=0.01) as first, Site(delay=0.01) as second:
         first.after, second.after = second.begun, first.begun  # a late worker finds trials left
-        err = run(words(tmp_path / "run", first.url, "--policy", second.url))
+        err = ended(start(words(tmp_path / "run", first.url, "--policy", second.url)))
         assert first.url in err and second.url in err  # the summary names both
         assert "queue" in err and "waiting" in err
     found = read_run(tmp_path / "run")
@@ -241,17 +202,15 @@ def test_a_server_that_dies_leaves_its_trials_to_the_other(tmp_path: Path) -> No
     with Site(delay=0.03) as first, Site(delay=0.03) as second:
         process = start(words(tmp_path / "run", first.url, "--policy", second.url, trials=10))
         assert first.begun.wait(30)
-        first.server.stop()
-        err = process.communicate(timeout=120)[1]
-        assert process.returncode == 0, err
-    assert f"{first.url} is away" in err
-    lines = [r for p in (tmp_path / "run" / "trials").glob("*.jsonl") for r in read_file(p)]
-    results = [r for r in lines if finished(r)]
-    assert len(results) == len({r.key for r in results}) == 60
-    assert all(r.success and r.attempts == len(r.retries) + 1 for r in results)
-    assert max(r.attempts for r in results) <= 2
-    lost = {row.key for row in lines if not finished(row) and not under_way(row)}
-    assert lost <= {r.key for r in results if r.retries}
+        first.stop()
+        assert f"{first.url} is away" in ended(process)
+    found = results(tmp_path / "run")
+    assert len(found) == len({r.key for r in found}) == 60
+    assert all(r.success and r.attempts == len(r.retries) + 1 for r in found)
+    assert max(r.attempts for r in found) <= 2
+    rows = lines(tmp_path / "run")
+    lost = {row.key for row in rows if not finished(row) and not under_way(row)}
+    assert lost <= {r.key for r in found if r.retries}
 
 
 def test_servers_with_different_specs_are_not_one_policy(tmp_path: Path) -> None:
@@ -269,11 +228,9 @@ def test_servers_with_different_specs_are_not_one_policy(tmp_path: Path) -> None
 
 def test_workers_come_while_others_wait_and_the_server_has_room(tmp_path: Path) -> None:
     notes: list[str] = []
-    keys = [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(30)]
+    keys = trial_keys(30)
     with Site(delay=0.05) as site:
-        config = WorkerConfig(
-            tmp_path, site.url, world="run_fakes:FakeWorld", parts="run_fakes:parts"
-        )
+        config = fake_config(tmp_path, site.url)
         runner = Runner(config, keys, RunOptions(workers=1, most=2), on_note=notes.append)
         runner.run()
     assert notes == ["workers wait while cores idle: 1 more, 2 now"]
