@@ -1,7 +1,5 @@
 """A worker that holds several trials: one computes while the others wait for their servers."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Mapping
@@ -12,7 +10,7 @@ import numpy as np
 import pytest
 from held_fakes import ScriptedExecutor, ThreadExecutor
 from numpy.typing import NDArray
-from run_fakes import SPEC, FakePolicy, FakeWorld, KeyedPolicy, parts
+from run_fakes import SPEC, FakePolicy, FakeWorld, KeyedPolicy, fake_config, parts, trial_keys
 
 from robospa.harness.policy_calls import Stopwatch
 from robospa.harness.running.executor import Activity, Heartbeat
@@ -23,7 +21,6 @@ from robospa.harness.running.heartbeat import (
     MonitoredPolicy,
 )
 from robospa.harness.running.runner import Runner, RunOptions
-from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.trial import run_trial
 from robospa.protocol.connection_limits import ServerOptions
 from robospa.protocol.errors import PolicyError
@@ -34,10 +31,10 @@ from robospa.results.records.runs import differences, read_records
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
-KEYS = [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(6)]
+KEYS = trial_keys(6)
 
 
-class Site:
+class Site(ServerThread):
     """A server with a policy object a connection; an answer waits until `meet` trials want one."""
 
     def __init__(self, meet: int = 1, **options: Any) -> None:
@@ -65,34 +62,19 @@ class Site:
                     met.set()
                 return super().infer(observation)
 
-        self.server = ServerThread(
-            policy_factory=Noting, options=ServerOptions(threads=meet, **options)
-        )
-
-    def __enter__(self) -> Site:
-        self.server.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.server.stop()
+        super().__init__(policy_factory=Noting, options=ServerOptions(threads=meet, **options))
 
 
 def run(
-    folder: Path, site: Site, concurrent_trials: int, world: str = "held_fakes:LoneWorld"
+    folder: Path, site: Site, concurrent_trials: int
 ) -> tuple[dict[TrialKey, TrialRecord], list[str], ThreadExecutor]:
     folder.mkdir()
     notes: list[str] = []
     options = {"timeouts": Timeouts(wait=0.0, connect=5.0)}
-    config = WorkerConfig(folder, site.server.url, options, world=world, parts="run_fakes:parts")
+    config = fake_config(folder, site.url, options=options, world="held_fakes:LoneWorld")
     executor = ThreadExecutor(config, concurrent_trials)
-    runner = Runner(
-        config,
-        KEYS,
-        RunOptions(backoff=0.01, concurrent_trials=concurrent_trials),
-        on_note=notes.append,
-    )
-    runner.executor = executor
-    runner.run()
+    limits = RunOptions(backoff=0.01, concurrent_trials=concurrent_trials)
+    Runner(config, KEYS, limits, on_note=notes.append, executor=executor).run()
     return read_records(folder), notes, executor
 
 
@@ -127,11 +109,13 @@ def test_after_the_death_of_a_worker_its_trials_have_the_next_one_to_themselves(
     deadly = KEYS[0]
     executor = ScriptedExecutor(2, lambda key: key == deadly)
     records: dict[TrialKey, TrialRecord] = {}
-    config = WorkerConfig(tmp_path, "ws://h:1", parts="run_fakes:parts")
-    runner = Runner(config, KEYS[:3], RunOptions(backoff=0.001, concurrent_trials=2))
-    runner.on_record = lambda record: records.update({record.key: record})
-    runner.executor = executor
-    runner.run()
+    Runner(
+        fake_config(tmp_path, "ws://h:1"),
+        KEYS[:3],
+        RunOptions(backoff=0.001, concurrent_trials=2),
+        lambda record: records.update({record.key: record}),
+        executor=executor,
+    ).run()
     assert {0, 1} <= {seed - 100000 for seed in executor.together[0]}
     alone = [seeds for seeds in executor.together[1:] if deadly.seed in seeds]
     assert alone == [{deadly.seed}] * 2
@@ -202,17 +186,6 @@ def test_one_waiting_for_its_turn_is_not_stuck() -> None:
 # ------ workers that do not advance are replaced; those that wait for a server, or compute, are not
 
 
-KEYS_HEARTBEAT = [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(3)]
-
-
-def after(*beats: tuple[float, int, Activity]) -> float:
-    """The deadline of a monitor of 10 s that began at 0 and received `beats`."""
-    monitor = HeartbeatMonitor(0.0, 10.0)
-    for when, count, activity in beats:
-        monitor.receive(Heartbeat(count, activity), when)
-    return monitor.deadline
-
-
 @pytest.mark.parametrize(
     ("beats", "deadline"),
     [
@@ -228,7 +201,11 @@ def after(*beats: tuple[float, int, Activity]) -> float:
 def test_what_counts_as_advancing(
     beats: list[tuple[float, int, Activity]], deadline: float
 ) -> None:
-    assert after(*beats) == deadline
+    """The deadline of a monitor of 10 s that began at 0 and received `beats`."""
+    monitor = HeartbeatMonitor(0.0, 10.0)
+    for when, count, activity in beats:
+        monitor.receive(Heartbeat(count, activity), when)
+    assert monitor.deadline == deadline
 
 
 def test_a_call_of_the_policy_is_announced_only_where_it_could_stop_the_heartbeats() -> None:
@@ -267,9 +244,10 @@ def test_what_a_policy_may_have_is_passed_on_and_what_it_lacks_does_nothing() ->
 def go(folder: Path, policy: str, world: str) -> tuple[list[TrialRecord], list[str]]:
     records: list[TrialRecord] = []
     notes: list[str] = []
-    config = WorkerConfig(folder, policy, world=world, parts="run_fakes:parts")
     options = RunOptions(workers=1, backoff=0.01, stuck_seconds=2.5)
-    Runner(config, KEYS_HEARTBEAT, options, records.append, notes.append).run()
+    config = fake_config(folder, policy, world=world)
+    Runner(config, KEYS[:3], options, records.append, notes.append).run()
+    assert sorted(record.key for record in records) == KEYS[:3]
     return records, notes
 
 
@@ -280,7 +258,6 @@ def test_a_worker_stuck_in_native_code_is_ended_and_its_trial_handed_back(
     mark.touch()
     monkeypatch.setenv("SOAK_STUCK", str(mark))
     records, notes = go(tmp_path / "run", "run_fakes:FakePolicy", "soak_fakes:SoakWorld")
-    assert sorted(r.key for r in records) == KEYS_HEARTBEAT
     assert sorted(r.attempts for r in records) == [1, 1, 2]
     assert len(notes) == 1 and "did not advance for 2.5 s and was killed; trying again" in notes[0]
 
@@ -289,15 +266,14 @@ class Thoughtful(KeyedPolicy):
     """Takes longer over one answer than a worker may be stuck."""
 
     def infer(self, observation: Mapping[str, Any]) -> NDArray[np.float32]:
-        assert self.trial is not None
         if self.seed == 100001 and observation["step"] == 0:
             time.sleep(3.5)
         return super().infer(observation)
 
 
 def test_a_policy_inside_the_worker_may_think_for_longer(tmp_path: Path) -> None:
-    records, notes = go(tmp_path, "test_held_trials:Thoughtful", "run_fakes:FakeWorld")
-    assert sorted(r.key for r in records) == KEYS_HEARTBEAT and notes == []
+    _, notes = go(tmp_path, "test_held_trials:Thoughtful", "run_fakes:FakeWorld")
+    assert notes == []
 
 
 def test_an_exception_of_a_policy_in_this_process_is_the_policys_error() -> None:

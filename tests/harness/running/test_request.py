@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from msgspec import structs
+from run_fakes import fake_config
 
 import robospa
 from robospa.harness.running import code_hash as module
@@ -16,7 +17,6 @@ from robospa.harness.running.code_hash import FOLDERS, LEFT_OUT, code_hash, file
 from robospa.harness.running.manifest import about_machine, check_folder, open_run, write_manifest
 from robospa.harness.running.request import client_options, make_request, run_folder
 from robospa.harness.running.runner import Runner, RunOptions
-from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.settings import EvaluationSettings, SettingsError, updated
 from robospa.results.records.manifest import (
     PolicySettings,
@@ -50,10 +50,8 @@ def test_a_server_gets_its_deadlines_and_its_token() -> None:
 
 def test_the_trials_are_those_of_the_settings() -> None:
     request = make_request(settings("hold", tasks="Pick_Blocks_Size", levels=[1, 3], trials=2))
-    assert [(key.level, key.task) for key in request.keys] == [
-        (1, "Pick_Blocks_Size"), (1, "Pick_Blocks_Size"),
-        (3, "Pick_Blocks_Size"), (3, "Pick_Blocks_Size"),
-    ]  # fmt: skip
+    assert {key.task for key in request.keys} == {"Pick_Blocks_Size"}
+    assert [key.level for key in request.keys] == [1, 1, 3, 3]
 
 
 def test_client_options_from_a_file(tmp_path: Path) -> None:
@@ -136,20 +134,12 @@ ROOT = Path(robospa.__path__[0])
 
 
 def test_files_are_found_by_folder(tmp_path: Path) -> None:
-    names = [
-        "a.py",
-        "tasks/b.py",
-        "tasks/in/c.toml",
-        "tasks/seeds/d.json",
-        "tasks/__pycache__/x.py",
-    ]
-    names += ["tasks/README.md", "tasks/.e.swp", "tasks/f.py~", "harness/g.py", "harness/in/h.py"]
-    for name in names:
+    counted = ["a.py", "tasks/b.py", "tasks/in/c.toml", "harness/g.py"]
+    others = ["seeds/d.json", "__pycache__/x.py", "README.md", ".e.swp", "f.py~"]
+    for name in [*counted, "harness/in/h.py", *(f"tasks/{other}" for other in others)]:
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(name)
-    folders = ("robospa/", "tasks/", "harness/*")
-    counted = ["a.py", "tasks/b.py", "tasks/in/c.toml", "harness/g.py"]
-    assert files_of(tmp_path, folders, LEFT_OUT) == counted
+    assert files_of(tmp_path, ("robospa/", "tasks/", "harness/*"), LEFT_OUT) == counted
     with pytest.raises(FileNotFoundError, match="gone"):
         files_of(tmp_path, ("gone/",))
 
@@ -316,8 +306,5 @@ def test_a_clock_that_goes_backwards_changes_nothing(
         return now[0]
 
     monkeypatch.setattr(time, "time", backwards)
-    config = WorkerConfig(
-        tmp_path, "run_fakes:FakePolicy", world="run_fakes:FakeWorld", parts="run_fakes:parts"
-    )
-    Runner(config, KEYS_MANIFEST[:2], RunOptions()).run()
+    Runner(fake_config(tmp_path), KEYS_MANIFEST[:2], RunOptions()).run()
     assert set(read_records(tmp_path)) == set(KEYS_MANIFEST[:2])

@@ -17,12 +17,11 @@ import msgpack
 import numpy as np
 import pytest
 from fault_server import ALWAYS, ONCE, ONES, SOUND, Fault, FaultyServer
-from run_fakes import KEYED, SPEC, FakePolicy, FakeWorld, parts
+from run_fakes import KEYED, SPEC, FakePolicy, FakeWorld, fake_config, parts
 
 from robospa.harness.running.executor import RunAborted
 from robospa.harness.running.policy_probe import probe
 from robospa.harness.running.runner import Runner, RunOptions
-from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.trial import run_trial
 from robospa.protocol.codec import encode
 from robospa.protocol.errors import WireError
@@ -80,14 +79,14 @@ def array(**changes: Any) -> Fault:
     return fault
 
 
-def spoiled(value: float) -> Any:
-    chunk = ONES.copy()
-    chunk[1, 3] = value
-    return chunk
+def spoiled(value: float) -> Fault:
+    answer = ONES.copy()
+    answer[1, 3] = value
+    return do.chunk(answer)
 
 
-def other(shape: tuple[int, ...], dtype: Any = np.float32) -> Any:
-    return np.ones(shape, dtype)
+def other(shape: tuple[int, ...], dtype: Any = np.float32) -> Fault:
+    return do.chunk(np.ones(shape, dtype))
 
 
 def back_as(name: str, greeting: bytes | Hello, words: str) -> Case:
@@ -97,7 +96,7 @@ def back_as(name: str, greeting: bytes | Hello, words: str) -> Case:
 
 SHAPE = "not (T, D) with T from 1 to its horizon 4"
 DROPPED = "closed without a reason"
-_ROWS = (
+CASES = (
     Case("open", "open", do.silence, WAITED, "finish the handshake", True),
     Case("greeting", "hello", do.silence, REPEATED, "did not send hello", True),
     Case("reset", "reset", do.silence, REPEATED, "did not send ready", True),
@@ -109,15 +108,15 @@ _ROWS = (
     Case("half", "first", do.cut_in_message, REPEATED, DROPPED),
     Case("restart", "later", do.restart, REPEATED, DROPPED),
     Case("between", "end", do.restart, UNHARMED),
-    Case("nan", "first", do.chunk(spoiled(np.nan)), POLICY, "nan in action 1, dimension 3"),
-    Case("infinite", "later", do.chunk(spoiled(-np.inf)), POLICY, "-inf in action 1, dimension 3"),
-    Case("many", "first", do.chunk(other((5, 14))), POLICY, SHAPE),
-    Case("million", "first", do.chunk(other((10**6, 14))), POLICY, SHAPE),
-    Case("none", "first", do.chunk(other((0, 14))), POLICY, SHAPE),
-    Case("flat", "first", do.chunk(other((14,))), POLICY, SHAPE),
-    Case("narrow", "first", do.chunk(other((2, 7))), POLICY, "7 numbers per action"),
-    Case("double", "first", do.chunk(other((2, 14), np.float64)), POLICY, "float64"),
-    Case("whole", "first", do.chunk(other((2, 14), np.int64)), POLICY, "int64"),
+    Case("nan", "first", spoiled(np.nan), POLICY, "nan in action 1, dimension 3"),
+    Case("infinite", "later", spoiled(-np.inf), POLICY, "-inf in action 1, dimension 3"),
+    Case("many", "first", other((5, 14)), POLICY, SHAPE),
+    Case("million", "first", other((10**6, 14)), POLICY, SHAPE),
+    Case("none", "first", other((0, 14)), POLICY, SHAPE),
+    Case("flat", "first", other((14,)), POLICY, SHAPE),
+    Case("narrow", "first", other((2, 7)), POLICY, "7 numbers per action"),
+    Case("double", "first", other((2, 14), np.float64), POLICY, "float64"),
+    Case("whole", "first", other((2, 14), np.int64), POLICY, "int64"),
     Case("far", "first", do.chunk(np.full((2, 14), 3.4e38, np.float32)), CLIPPED, "its limit 10"),
     Case("times", "first", do.chunk(ONES, infer_ms=np.nan, queue_ms=np.inf), UNHARMED),
     Case("object", "first", array(dtype="|O"), REPEATED, "dtype '|O' is no plain number"),
@@ -154,11 +153,8 @@ _ROWS = (
     back_as("checkpoint", hello(checkpoint="step 2000"), "checkpoint was '' and is 'step 2000'"),
     back_as("version", Hello(0, "2.0", "", SPEC), "protocol 2.0 and this is 1.1"),
 )
-CASES = {case.name: case for case in _ROWS}
-
-
-RUN = [case for case in CASES.values() if case.end != STOPS]
-STOPPING = [case for case in CASES.values() if case.end == STOPS]
+RUN = [case for case in CASES if case.end != STOPS]
+STOPPING = [case for case in CASES if case.end == STOPS]
 
 
 @dataclass
@@ -186,24 +182,15 @@ def run(cases: Iterable[Case], folder: Path, hasty: bool = False, workers: int =
     with ExitStack() as stack:
         for case in cases:
             seen.urls[case.name] = stack.enter_context(FaultyServer(case.point, case.fault))
-        config = WorkerConfig(
-            folder,
-            "",
-            {"timeouts": deadlines},
-            world="run_fakes:FakeWorld",
-            parts="run_fakes:parts",
-            policies=seen.urls,
-        )
+        config = fake_config(folder, "", options={"timeouts": deadlines}, policies=seen.urls)
         keys = [TrialKey(case.name, 1, seed) for case in cases for seed in case.seeds]
         options = RunOptions(workers, attempts, backoff=0.01, give_up=len(keys))
+
+        def keep(record: TrialRecord) -> None:
+            seen.records[record.key] = record
+
         try:
-            Runner(
-                config,
-                keys,
-                options,
-                lambda record: seen.records.update({record.key: record}),
-                seen.notes.append,
-            ).run()
+            Runner(config, keys, options, keep, seen.notes.append).run()
         except RunAborted as error:
             seen.stopped = str(error)
     return seen
