@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from run_fakes import FakePolicy, FakeWorld, parts
+from run_fakes import FakePolicy, FakeWorld, parts, trial_keys
 
 from robospa.harness.pool import WorkerDied
 from robospa.harness.running.films import FilmDone
@@ -17,12 +17,7 @@ from robospa.results.records.runs import film_name
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
-KEYS = [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(6)]
-
-
-def config(folder: Path, world: str = "run_fakes:FakeWorld", **changes: object) -> WorkerConfig:
-    made = WorkerConfig(folder, "", world=world, parts="run_fakes:parts")
-    return replace(made, **changes)  # type: ignore[arg-type]
+KEYS = trial_keys(6)
 
 
 def recorded(

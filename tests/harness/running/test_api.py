@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from run_fakes import FakePolicy
+from run_fakes import FAKES, FakePolicy
 
 import robospa
 from robospa.harness.settings import FILE, SettingsError
@@ -17,14 +17,8 @@ from robospa.results.records.runs import Run
 
 pytestmark = pytest.mark.usefixtures("world_asked_here")
 
-FAKES: dict[str, Any] = {
-    "world": "run_fakes:FakeWorld",
-    "parts": "run_fakes:parts",
-    "tasks": "Pick_Blocks_Size",
-    "levels": [1, 2],
-    "seeds": "100000-100001",
-    "trials": 2,
-}
+FOUR = {"tasks": "Pick_Blocks_Size", "levels": [1, 2], "seeds": "100000-100001", "trials": 2}
+RUN: dict[str, Any] = {**FAKES, **FOUR}
 
 
 class Batched(FakePolicy):
@@ -44,39 +38,39 @@ def check(run: Run, folder: Path) -> None:
 
 def test_a_server(tmp_path: Path) -> None:
     with ServerThread(policy_factory=FakePolicy, token="secret") as server:
-        run = robospa.evaluate(server.url, token="secret", workers=2, out=tmp_path, **FAKES)
+        run = robospa.evaluate(server.url, token="secret", workers=2, out=tmp_path, **RUN)
     check(run, tmp_path)
     assert "secret" not in (tmp_path / FILE).read_text() + (tmp_path / "run.json").read_text()
 
 
 def test_several_servers(tmp_path: Path) -> None:
     with ServerThread(policy_factory=FakePolicy) as a, ServerThread(policy_factory=FakePolicy) as b:
-        run = robospa.evaluate([a.url, b.url], workers=2, out=tmp_path, **FAKES)
+        run = robospa.evaluate([a.url, b.url], workers=2, out=tmp_path, **RUN)
     check(run, tmp_path)
     assert run.manifest.about.arguments["policy"] == [a.url, b.url]
 
 
 @pytest.mark.parametrize("policy", [FakePolicy, lambda: FakePolicy(), Batched()])
 def test_what_serves_several_workers(policy: Any, tmp_path: Path) -> None:
-    check(robospa.evaluate(policy, workers=2, out=tmp_path, **FAKES), tmp_path)
+    check(robospa.evaluate(policy, workers=2, out=tmp_path, **RUN), tmp_path)
 
 
 def test_an_object_serves_one_worker_and_stays_in_this_process(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     policy = FakePolicy()
-    run = robospa.evaluate(policy, out=tmp_path, **FAKES)
+    run = robospa.evaluate(policy, out=tmp_path, **RUN)
     check(run, tmp_path)
     assert policy.trial is not None and policy.trial.task == "Pick_Blocks_Size"
     said = " ".join(capfd.readouterr())
     assert "checkpoint" not in said, "the address that it is served at for now is nobody's server"
     assert run.manifest.about.policy.target == "robospa.evaluate"
     assert "unknown-checkpoint" not in {finding.rule for finding in lint_run(run)}
-    assert robospa.evaluate(policy, out=tmp_path, resume=True, **FAKES).records == run.records
+    assert robospa.evaluate(policy, out=tmp_path, resume=True, **RUN).records == run.records
 
 
 def test_a_module_and_class_and_its_settings_again(tmp_path: Path) -> None:
-    first = robospa.evaluate("run_fakes:FakePolicy", workers=1, out=tmp_path / "a", **FAKES)
+    first = robospa.evaluate("run_fakes:FakePolicy", workers=1, out=tmp_path / "a", **RUN)
     check(first, tmp_path / "a")
     again = robospa.evaluate(config=tmp_path / "a" / FILE, out=tmp_path / "b", resume="auto")
     assert again.keys == first.keys
@@ -102,7 +96,7 @@ def test_what_cannot_be_is_refused_before_anything_is_written(
     policy: Any, more: dict[str, Any], reason: str, tmp_path: Path
 ) -> None:
     with pytest.raises(SettingsError, match=reason):
-        robospa.evaluate(policy, out=tmp_path / "run", **FAKES, **more)
+        robospa.evaluate(policy, out=tmp_path / "run", **RUN, **more)
     assert not (tmp_path / "run").exists()
 
 

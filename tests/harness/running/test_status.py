@@ -237,11 +237,8 @@ def test_memory_and_cores_bound_it(monkeypatch: pytest.MonkeyPatch) -> None:
 # -------------------------------- `--log wandb`, against a W&B that only remembers what it was told
 
 
-RUN: dict[str, Any] = {
-    **FAKES,
-    **{"tasks": "Pick_Blocks_Size", "levels": 1, "seeds": "100000-100001"},
-    **{"trials": 2, "workers": 1},
-}
+TWO = {"tasks": "Pick_Blocks_Size", "levels": 1, "seeds": "100000-100001", "trials": 2}
+RUN: dict[str, Any] = {**FAKES, **TWO, "workers": 1}
 
 
 class FakeWandb(types.ModuleType):
