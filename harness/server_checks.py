@@ -18,14 +18,8 @@ from dataclasses import dataclass
 
 from robospa.extras import remedy
 from robospa.harness.clock.policy_clock import Latency, of_samples
-from robospa.harness.trial import (
-    TrialSetup,
-    new_run_seed,
-    policy_seed,
-    run_trial,
-    task_parts,
-    trial_id,
-)
+from robospa.harness.replay import rehearse
+from robospa.harness.trial import TrialSetup, new_run_seed, task_parts
 from robospa.harness.world import World
 from robospa.protocol.client import RemotePolicy
 from robospa.protocol.conformance import CheckResult, synthetic_observation, trial_for
@@ -66,14 +60,7 @@ def rollouts(
             with closing(world), connect() as policy:
                 spec = policy.spec
                 key = TrialKey(TASK, LEVEL, accepted(TASK, LEVEL)[0], robot_of(spec))
-                record = run_trial(
-                    world,
-                    policy,
-                    key,
-                    policy_seed=policy_seed(key, seed),
-                    trial_id=trial_id(key, seed),
-                    parts=parts,
-                )
+                record = rehearse(world, policy, seed, key, parts(key))
         except WireError as error:
             yield CheckResult(name, False, str(error))
             return

@@ -3,7 +3,6 @@ a data set."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -116,26 +115,19 @@ def collect(
     if questions:
         _questions(_group(Collection, given), out, _group(Compute, given).workers, as_json)
         return
-    from robospa.harness.cli.eval import terminable
+    from robospa.harness.cli.eval import resumable
     from robospa.harness.datasets import collect as collecting
-    from robospa.harness.running.executor import RunAborted
 
     order = collecting.Order(_group(Collection, given), layout, out)
     again = f"the same command with --out {out} --resume goes on from here"
-    try:
-        with terminable():
-            result = collecting.collect_order(
-                order,
-                _group(Compute, given),
-                resume=resume,
-                keep_episodes=keep_episodes,
-                say=aside if as_json else print,
-            )
-    except KeyboardInterrupt:
-        print(f"robospa: interrupted; {again}", file=sys.stderr)
-        raise typer.Exit(130) from None
-    except (MakerError, StorageError) as error:
-        raise RunAborted(f"the collection stopped: {error}; {again}") from error
+    with resumable("the collection", again, (MakerError, StorageError)):
+        result = collecting.collect_order(
+            order,
+            _group(Compute, given),
+            resume=resume,
+            keep_episodes=keep_episodes,
+            say=aside if as_json else print,
+        )
     if as_json:
         made = {} if result is None else asdict(result)
         print_json({"out": out, "finished_before": result is None, **made})
@@ -144,7 +136,7 @@ def collect(
     if result is None:
         return
     for line in result.missing:
-        print(f"robospa: {line}", file=sys.stderr)
+        aside(f"robospa: {line}")
     if not as_json:
         print(f"{out}: {result.episodes} episodes; robospa collect --verify {out} checks them")
     if result.missing:
@@ -193,7 +185,7 @@ def _convert(folder: Path, out: Path, layout: str, images: str, as_json: bool) -
 
     found = import_recordings(find_recordings(folder), folder, layout, out, images)
     for why, count in found.left_out.most_common():
-        print(f"robospa: {count} recordings are left out: {why}", file=sys.stderr)
+        aside(f"robospa: {count} recordings are left out: {why}")
     lacks = list(found.made.settings["absent"])
     if as_json:
         counts = {"episodes": found.made.episodes, "frames": found.made.frames}
@@ -216,7 +208,7 @@ def _verify(out: Path, replays: int, as_json: bool) -> None:
         for line in [] if as_json else verdict.checked:
             print(f"{folder}: {line}")
         for line in verdict.problems:
-            print(f"robospa: {line}", file=sys.stderr)
+            aside(f"robospa: {line}")
     sound = not any(verdict.problems for verdict in verdicts.values())
     if as_json:
         print_json({"sound": sound, "folders": verdicts})

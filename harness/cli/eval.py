@@ -4,7 +4,6 @@ several latencies."""
 from __future__ import annotations
 
 import signal
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from robospa.harness.cli.options import AsJson, Token, given_flags, print_json, with_flags
+from robospa.harness.cli.options import AsJson, Token, aside, given_flags, print_json, with_flags
 from robospa.harness.running.evaluate import Request, RunAborted
 from robospa.harness.running.evaluate import evaluate as run_request
 from robospa.harness.running.films import FilmsInterrupted
@@ -107,15 +106,10 @@ def run_and_show(request: Request, *, as_json: bool = False) -> None:
     again = f"the same command with --out {folder} --resume goes on from here"
     unfilmed = ""
     try:
-        with terminable():
+        with resumable("the run", again):
             run_request(request)
     except FilmsInterrupted as error:
         unfilmed = f"robospa: interrupted after the last trial; {error}"
-    except KeyboardInterrupt:
-        print(f"robospa: interrupted; {again}", file=sys.stderr)
-        raise typer.Exit(130) from None
-    except RunAborted as error:
-        raise RunAborted(f"the run stopped: {error}; {again}") from error
     run = read_run(folder)
     if as_json:
         print_json({"folder": folder, **run_data(run)})
@@ -125,18 +119,17 @@ def run_and_show(request: Request, *, as_json: bool = False) -> None:
         for part in by_setting(run):
             print_scores(part, results_of_run(part), beside=False)
     if run.missing:
-        print(
+        aside(
             f"robospa: {len(run.missing)} of {len(run.keys)} trials could not be run and are "
-            f"missing from these numbers; {again}",
-            file=sys.stderr,
+            f"missing from these numbers; {again}"
         )
         raise typer.Exit(1)
     if text := many_policy_errors(run):
         hint = f"look at the reasons above, or at `robospa report {folder} --failures`"
-        print(f"robospa: {text}; {hint}", file=sys.stderr)
+        aside(f"robospa: {text}; {hint}")
         raise typer.Exit(1)
     if unfilmed:
-        print(unfilmed, file=sys.stderr)
+        aside(unfilmed)
         raise typer.Exit(130)
     if not as_json:
         print(f"Run: {folder}   Report: robospa report {folder}")
@@ -163,15 +156,21 @@ def run_data(run: Run) -> dict[str, object]:
 
 
 @contextmanager
-def terminable() -> Iterator[None]:
-    """Treat SIGTERM like Ctrl-C while a run is going on."""
-
-    def interrupt(number: int, frame: object) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, interrupt)
+def resumable(
+    what: str, again: str, errors: tuple[type[Exception], ...] = (RunAborted,)
+) -> Iterator[None]:
+    """Treat SIGTERM like Ctrl-C while `what` is going on, which ends the program with 130; after
+    one of `errors` it "stopped", a RunAborted. `again` says how to go on."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         yield
+    except FilmsInterrupted:
+        raise
+    except KeyboardInterrupt:
+        aside(f"robospa: interrupted; {again}")
+        raise typer.Exit(130) from None
+    except errors as error:
+        raise RunAborted(f"{what} stopped: {error}; {again}") from error
     finally:
         signal.signal(signal.SIGTERM, before)
 
@@ -239,16 +238,13 @@ def _run_one(request: Request, what: str) -> None:
     from robospa.results.records.runs import read_run
 
     again = "the same command with --resume goes on from here"
-    print(f"{what}:", file=sys.stderr)
+    aside(f"{what}:")
     try:
-        with terminable():
+        with resumable(f"the run at {what}", again):
             run_request(request)
-    except KeyboardInterrupt as error:
-        about = f" after the last trial of {what}; {error}" if str(error) else ""
-        print(f"robospa: interrupted{about}; {again}", file=sys.stderr)
+    except FilmsInterrupted as error:
+        aside(f"robospa: interrupted after the last trial of {what}; {error}; {again}")
         raise typer.Exit(130) from None
-    except RunAborted as error:
-        raise RunAborted(f"the run at {what} stopped: {error}; {again}") from error
     run = read_run(request.config.folder)
     if run.missing:
         raise RunAborted(f"{len(run.missing)} trials at {what} could not be run; {again}")

@@ -1,10 +1,11 @@
 """`robospa learn`: train the learned reference anew."""
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from robospa.harness.cli.options import aside
 
 
 def learn(
@@ -33,6 +34,6 @@ def learn(
     try:
         load("robospa.baselines.learned.train:train")(out, options)
     except KeyboardInterrupt:
-        print(f"robospa: interrupted; the same command goes on in {out}", file=sys.stderr)
+        aside(f"robospa: interrupted; the same command goes on in {out}")
         raise typer.Exit(130) from None
     print(f"{out}: trained; robospa serve learned {out} serves it")

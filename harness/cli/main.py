@@ -7,7 +7,7 @@ came from.
 import importlib
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -79,7 +79,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _run(words: list[str]) -> None:
-    typed = completed_line(os.environ) if COMPLETION in os.environ else words
+    line = os.environ.get("_TYPER_COMPLETE_ARGS") or os.environ.get("COMP_WORDS", "")
+    typed = line.split()[1:] if COMPLETION in os.environ else words
     chosen = next((w for w in typed if not w.startswith("-")), "")
     if "--version" in words[:1]:
         from importlib.metadata import version
@@ -104,7 +105,7 @@ def _run(words: list[str]) -> None:
     )
     for name, summary in COMMANDS.items():
         if name != chosen:
-            app.command(name, short_help=summary)(_unloaded)
+            app.command(name, short_help=summary)(lambda: None)
             continue
         found = command_of(name)
         if isinstance(found, typer.Typer):
@@ -119,16 +120,6 @@ def command_of(name: str) -> Any:
     """The function, or the group of commands, of a subcommand."""
     module, _, function = PLACES.get(name, f"robospa.harness.cli.{name}:{name}").partition(":")
     return getattr(importlib.import_module(module), function)
-
-
-def completed_line(environment: Mapping[str, str]) -> list[str]:
-    """The words after `robospa` on the line that a shell asks to complete."""
-    line = environment.get("_TYPER_COMPLETE_ARGS") or environment.get("COMP_WORDS", "")
-    return line.split()[1:]
-
-
-def _unloaded() -> None:
-    """Stands for a subcommand that was not chosen."""
 
 
 def misused(error: Exception) -> str:

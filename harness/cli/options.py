@@ -138,9 +138,8 @@ def _completion(choices: Sequence[str]) -> Callable[[str], list[str]] | None:
 
 def given_flags(context: typer.Context) -> dict[str, object]:
     """The parameters of a command that were given a value on the command line."""
-    sources = {name: context.get_parameter_source(name) for name in context.params}
     return {
-        name: context.params[name]
-        for name, source in sources.items()
-        if source is not None and source.name != "DEFAULT"
+        name: value
+        for name, value in context.params.items()
+        if (source := context.get_parameter_source(name)) is not None and source.name != "DEFAULT"
     }

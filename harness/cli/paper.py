@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from robospa.harness.cli.options import AsJson, print_json
-
-if TYPE_CHECKING:
-    from robospa.results.paper.check import Check
 
 
 def paper(
@@ -60,7 +56,10 @@ def paper(
         if runs:
             print(banner([c.title for c in published], [c.results for c in added]))
         show(tables[0])
-        _print_errata(len(checks()), errata())
+        walked, wrong = len(checks()), errata()
+        print(f"\n{walked} printed cells checked; {len(wrong)} do not follow from the others:")
+        for number, check in enumerate(wrong, 1):
+            print(f"{number:3} {check}")
         print(f"\n{len(written)} files of tables in {out}")
     drawn = []
     if figures and not table:
@@ -75,9 +74,3 @@ def paper(
     if as_json:
         found = {"checked": len(checks()), "errata": errata(), "table": tables[0]}
         print_json({"out": out, "files": written, "figures": drawn, **found})
-
-
-def _print_errata(walked: int, wrong: Sequence[Check]) -> None:
-    print(f"\n{walked} printed cells checked; {len(wrong)} do not follow from the others:")
-    for number, check in enumerate(wrong, 1):
-        print(f"{number:3} {check}")

@@ -21,22 +21,6 @@ if TYPE_CHECKING:
 PAPER = "paper"
 
 
-HiddenRun = Annotated[
-    Path | None, typer.Option(help="with --audit: the same policy's run on hidden scenes")
-]
-Server = Annotated[
-    str | None,
-    typer.Option(help="with --audit: URL of the server, to be queried with swapped sentences"),
-]
-Samples = Annotated[
-    int,
-    typer.Option(
-        callback=between(0, 10_000),
-        help="with --audit: trials to hold against the expert's, and to ask --policy for",
-    ),
-]
-
-
 def report(
     run: Annotated[list[Path], typer.Argument(help="runs, or one folder of runs, side by side")],
     with_published: Annotated[
@@ -80,9 +64,20 @@ def report(
             "--audit", help="only look for signs of cheating in a run or bundle; exit code 1 if any"
         ),
     ] = False,
-    reproduction: HiddenRun = None,
-    policy: Server = None,
-    samples: Samples = 10,
+    reproduction: Annotated[
+        Path | None, typer.Option(help="with --audit: the same policy's run on hidden scenes")
+    ] = None,
+    policy: Annotated[
+        str | None,
+        typer.Option(help="with --audit: URL of the server, to be queried with swapped sentences"),
+    ] = None,
+    samples: Annotated[
+        int,
+        typer.Option(
+            callback=between(0, 10_000),
+            help="with --audit: trials to hold against the expert's, and to ask --policy for",
+        ),
+    ] = 10,
     token: Token = None,
     as_json: AsJson = False,
 ) -> None:

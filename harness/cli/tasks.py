@@ -60,8 +60,8 @@ def tasks(
     _check(camera, split)
     if world is not None and (as_json or view):
         raise typer.BadParameter("--world goes with pictures: leave out --json and --view")
+    splits = SPLITS if split is None else (split,)
     if as_json:
-        splits = SPLITS if split is None else (split,)
         found: object = (
             _list_json() if name is None else _scene_json(_scene(name, level, seed), splits)
         )
@@ -78,7 +78,7 @@ def tasks(
         scene = _scene(name, level, seed)
         told, shown = (scene, scene) if world is None else _official(world)(scene)
         pixels = parse_size(size)
-        _describe(console, told, SPLITS if split is None else (split,))
+        _describe(console, told, splits)
         if frame:
             path = out or Path(f"{scene.task}-L{level}-{seed}.png")
             _draw(console, shown, camera, pixels, path)
@@ -182,13 +182,9 @@ def _listing() -> Table:
     table.add_column("limit")
     for task in all_tasks().values():
         levels = [task.levels[k] for k in sorted(task.levels)]
-        table.add_row(
-            task.name,
-            task.category,
-            per_level([item.candidates for item in levels]),
-            per_level([item.subtasks for item in levels]),
-            per_level([item.steps for item in levels]),
-        )
+        names = ("candidates", "subtasks", "steps")
+        limits = (per_level([getattr(level, name) for level in levels]) for name in names)
+        table.add_row(task.name, task.category, *limits)
     return table
 
 

@@ -151,7 +151,8 @@ def _counts(facts: CardFacts) -> str:
             rows.append([f"{title} ({category})", *counts, sum(counts)])
     totals = [sum(by_category[c, level] for c in present) for level in levels]
     rows.append(["all", *totals, facts.episodes])
-    lengths = sorted(facts.lengths.items(), key=lambda item: item[0][1])
+    lengths = sorted(n for (_, n), count in facts.lengths.items() for _ in range(count))
+    least, half, most = (lengths[max(0, math.ceil(q * len(lengths)) - 1)] for q in (0, 0.5, 1))
     return "\n\n".join(
         (
             "## Episodes",
@@ -159,17 +160,10 @@ def _counts(facts: CardFacts) -> str:
             table(["scene mode", "episodes"], sorted(facts.modes.items())),
             table(["kind", "episodes"], sorted(facts.kinds.items())),
             table(["whose command", "frames"], list(zip(LABELS, facts.labels, strict=True))),
-            f"Frames of an episode: {_quantile(lengths, 0)} to {_quantile(lengths, 1)}, half of "
-            f"them up to {_quantile(lengths, 0.5)}.",
+            f"Frames of an episode: {least} to {most}, half of them up to {half}.",
             f"![Frames of an episode by level]({LENGTHS})",
         )
     )
-
-
-def _quantile(lengths: Sequence[tuple[tuple[int, int], int]], share: float) -> int:
-    """The number of frames that `share` of the episodes do not exceed."""
-    frames = [length for (_, length), count in lengths for _ in range(count)]
-    return frames[max(0, math.ceil(share * len(frames)) - 1)]
 
 
 def _failures(facts: CardFacts) -> str:

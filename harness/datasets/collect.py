@@ -120,11 +120,6 @@ class EpisodeStore:
         """Bytes of all episodes."""
         return sum(path.stat().st_size for path in self.folder.rglob("*.zip"))
 
-    def remove(self) -> None:
-        """Remove all of it."""
-        with storage_errors(self.folder):
-            shutil.rmtree(self.folder)
-
 
 class CollectionProgress(Bar):
     """Counts what comes in and shows it.
@@ -270,12 +265,14 @@ def collect(
     """
     named = {"tasks": tasks, "levels": levels, "episodes": episodes, "workers": workers}
     given = {**named, **settings}
-    names = [{field.name for field in fields(kind)} for kind in (Collection, Compute)]
-    if unknown := next((name for name in given if not any(name in of for of in names)), None):
-        known = [field.name for kind in (Collection, Compute) for field in fields(kind)]
-        near = did_you_mean(unknown, known)
-        raise SettingsError(f"there is no setting {unknown!r}; {near}known are {', '.join(known)}")
-    own, machine = ({n: v for n, v in given.items() if n in of} for of in names)
+    kinds = {field.name: kind for kind in (Collection, Compute) for field in fields(kind)}
+    if unknown := next((name for name in given if name not in kinds), None):
+        near = did_you_mean(unknown, kinds)
+        raise SettingsError(f"there is no setting {unknown!r}; {near}known are {', '.join(kinds)}")
+    own, machine = (
+        {name: value for name, value in given.items() if kinds[name] is kind}
+        for kind in (Collection, Compute)
+    )
     compute = changed(Compute(), Compute, machine)
     order = Order(changed(Collection(), Collection, own), format, Path(out))
     return collect_order(order, compute, resume=resume)
@@ -312,7 +309,9 @@ def make(
     check_packages(order.layout)
     with run_lock(order.out) as lock:
         store = EpisodeStore(order.out / EPISODES)
-        folders = dataset_folders(order.out, keys)
+        robots = dict.fromkeys(key.embodiment for key in keys)  # a data set has one: one width
+        one = len(robots) == 1
+        folders = {r: order.out if one else order.out / path_part(r) for r in robots}
         if all((folder / MANIFEST).exists() for folder in folders.values()):
             _check_finished(order, list(folders.values()), resume)
             _clear(order.out, store, keep_episodes)
@@ -328,15 +327,6 @@ def make(
         result = _pack(order, wanted, store, folders, say)
         _clear(order.out, store, keep_episodes)
     return result
-
-
-def dataset_folders(out: Path, keys: Sequence[ListKey]) -> dict[str, Path]:
-    """The folder of each robot's data set: `out`, or one below it each if there are several.
-
-    A data set has actions of one width.
-    """
-    robots = dict.fromkeys(key.embodiment for key in keys)
-    return {r: out if len(robots) == 1 else out / path_part(r) for r in robots}
 
 
 def _check_finished(order: Order, folders: Sequence[Path], resume: bool) -> None:
@@ -368,7 +358,8 @@ def _check_folder(out: Path, store: EpisodeStore, resume: bool) -> None:
 def _clear(out: Path, store: EpisodeStore, keep_episodes: bool) -> None:
     """Leave nothing in `out` but the data set, and its episodes if they are wanted."""
     if not keep_episodes and store.folder.exists():
-        store.remove()
+        with storage_errors(store.folder):
+            shutil.rmtree(store.folder)
     for path in (out / LOCK, *out.rglob(PARTIAL)):  # of one that was killed
         path.unlink(missing_ok=True)
 

@@ -174,14 +174,11 @@ def write_sums(folder: Path, files: Sequence[Path]) -> str:
 
 def read_sums(folder: Path) -> dict[str, str]:
     """Every file's hash by its path below `folder`, as SHA256SUMS says; raises DatasetError."""
-    found = {}
     try:
-        for line in (folder / SUMS).read_text(encoding="utf-8").splitlines():
-            digest, _, name = line.partition("  ")
-            found[name] = digest
+        lines = (folder / SUMS).read_text(encoding="utf-8").splitlines()
     except (OSError, ValueError) as error:
         raise DatasetError(f"{folder / SUMS} cannot be read: {error}") from error
-    return found
+    return {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
 
 
 def file_hash(path: Path) -> str:

@@ -6,6 +6,7 @@ again. `robospa.json` comes last: a data set without it was not finished.
 
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
@@ -176,8 +177,7 @@ def pack_episodes(
 
 
 def _write(writer: Writer, folder: Path, episodes: Iterable[Source], facts: CardFacts) -> None:
-    lines = EpisodeLines(folder)
-    try:
+    with closing(EpisodeLines(folder)) as lines:
         for index, (name, episode) in enumerate(episodes):
             try:
                 file = writer.add(episode)
@@ -185,18 +185,13 @@ def _write(writer: Writer, folder: Path, episodes: Iterable[Source], facts: Card
                 raise DatasetError(f"{name} cannot be packed: {error}") from error
             lines.add(index, episode, file)
             facts.add(episode)
-    finally:
-        lines.close()
     writer.close()
 
 
 def _remove_packed(folder: Path) -> None:
     (folder / MANIFEST).unlink(missing_ok=True)
-    if not (folder / SUMS).exists():
-        return
-    for name in read_sums(folder):
+    for name in (*read_sums(folder), SUMS) if (folder / SUMS).exists() else ():
         (folder / name).unlink(missing_ok=True)
-    (folder / SUMS).unlink()
 
 
 def _remove(path: Path) -> None:

@@ -12,7 +12,7 @@ from robospa.harness.factory import load_function
 from robospa.harness.pool import JobProcess, JobWorker, Pool, WorkerDied
 from robospa.harness.running import ray_executor
 from robospa.harness.running.status import cores
-from robospa.harness.seeds.attempt import CRASHED, MOST_TEXT, Attempt
+from robospa.harness.seeds.attempt import CRASHED, Attempt, one_line
 from robospa.harness.settings import Compute
 from robospa.harness.world import RenderUnavailable, SceneUnstable
 from robospa.observation import CameraSpec
@@ -83,7 +83,7 @@ def maker_at(path: str) -> Callable[[EpisodeJob], Attempt]:
 
 def refused(seed: int, reason: str) -> EpisodeAttempt:
     """A seed without an episode."""
-    return EpisodeAttempt(seed, False, " ".join(reason.split())[:MOST_TEXT])
+    return EpisodeAttempt(seed, False, one_line(reason))
 
 
 EPISODE_SECONDS = 3600.0
@@ -132,10 +132,12 @@ def pool_opener(compute: Compute, maker: str = MAKER) -> Iterator[OpenPool]:
 def _pool(
     start: Callable[[], JobWorker[EpisodeJob, Attempt]], workers: int
 ) -> Pool[EpisodeJob, Attempt]:
-    def crashed(job: EpisodeJob) -> Attempt:
-        return refused(job.key.seed, CRASHED)
-
-    return Pool(start, workers, crashed=crashed, jobs_each=EPISODES_PER_WORKER)
+    return Pool(
+        start,
+        workers,
+        crashed=lambda job: refused(job.key.seed, CRASHED),
+        jobs_each=EPISODES_PER_WORKER,
+    )
 
 
 class MakerActor:

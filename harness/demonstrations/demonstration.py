@@ -185,10 +185,8 @@ def recorded_expert(key: TrialKey, name: str) -> tuple[Episode, bool]:
             for of, image in zip(pictures.values(), images, strict=True):
                 of.append(to_jpeg(image))
     commanded, measured, ee, _ = (of.astype(float) for of in recorder.columns())
-    space, about = (
-        embodiment(key.embodiment).action_space("joint"),
-        {**asdict(key), "stride": stride},
-    )
+    space = embodiment(key.embodiment).action_space("joint")
+    about = {**asdict(key), "stride": stride}
     seen = Episode(name, commanded, ee, pictures, space, made.instruction, measured, about)
     return seen, made.success
 

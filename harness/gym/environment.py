@@ -7,7 +7,7 @@ are those of `robospa eval`, so that the same seed and the same actions end in t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import gymnasium
@@ -127,14 +127,15 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         is none to draw from.
         """
         super().reset(seed=seed)
-        self._key = self._key_of(self._draw() if seed is None else seed)
+        self._key = replace(self._key, seed=self._draw() if seed is None else int(seed))
         self._record = None
         self._told = 0
         setup = self._parts(self._key)
         self._trial = open_trial(self._opened(), self._key, setup)
         if self._trial.start():
             self._finish(self._trial.end, "the goal was decided before the first action")
-        return self._observation(), {**self._info(), **self._about()}
+        about = {**asdict(self._key), "instruction": self.instruction}
+        return self._observation(), {**self._info(), **about}
 
     def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, Info]:
         """Execute one action, float32 (D,).
@@ -196,9 +197,6 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """The record of the trial that is over, as a run writes it; None while it goes on."""
         return self._record
 
-    def _key_of(self, seed: int) -> TrialKey:
-        return TrialKey(**{**asdict(self._key), "seed": int(seed)})
-
     def _draw(self) -> int:
         """One of the seeds, by this environment's own generator."""
         key = self._key
@@ -245,9 +243,6 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             for name in ("end", "message", "digest", "actions_digest"):
                 info[name] = getattr(self._record, name)
         return info
-
-    def _about(self) -> Info:
-        return {**asdict(self._key), "instruction": self.instruction}
 
 
 def space_of(name: str, value: Any) -> Any:

@@ -8,6 +8,7 @@ at its rim. Pieces keep at most `CORNERS` corners: those farthest in evenly spre
 """
 
 from collections.abc import Sequence
+from importlib.util import find_spec
 
 import numpy as np
 
@@ -126,7 +127,7 @@ def _packed(archive: Archive, solid: Sequence[MeshUse], whole: bool) -> Arrays:
         turn, shift = use.transform[:3, :3].T, use.transform[:3, 3]
         shapes = mesh_files.read_shapes(use.file, archive.inside)
         if whole:
-            shapes = [_joined(shapes)]
+            shapes = [mesh_files.joined(shapes)]
         elif use.file.suffix.lower() in (".stl", ".ply"):
             shapes = [part for shape in shapes for part in connected_parts(*shape)]
         shapes = [(v @ turn + shift, f) for v, f in shapes]
@@ -140,12 +141,6 @@ def _packed(archive: Archive, solid: Sequence[MeshUse], whole: bool) -> Arrays:
         "triangles": np.concatenate([triangles for _, triangles in pieces]),
         "triangle_counts": np.array([len(triangles) for _, triangles in pieces]),
     }
-
-
-def _joined(shapes: Sequence[Piece]) -> Piece:
-    starts = np.cumsum([0, *(len(vertices) for vertices, _ in shapes)])
-    faces = [faces + start for (_, faces), start in zip(shapes, starts, strict=False)]
-    return np.concatenate([vertices for vertices, _ in shapes]), np.concatenate(faces)
 
 
 SQUARE = 1e-3
@@ -190,7 +185,7 @@ def is_filled(archive: Archive, model: OfficialModel) -> bool:
     """Whether `model` should be hollow and its collision pieces, which are read or taken from the
     cache, close its mouth; False where meshes cannot be read, because trimesh is not installed.
     ArchiveError, in one sentence, for a file that cannot be used."""
-    if not model.hollow or not mesh_files.reads_meshes():
+    if not model.hollow or find_spec("trimesh") is None:
         return False
     collision = archive.files(model).collision
     if collision is None:

@@ -9,7 +9,6 @@ not followed.
 
 from __future__ import annotations
 
-import importlib.util
 import io
 import json
 import math
@@ -102,14 +101,19 @@ def _tiled(
     for index, part in enumerate(pictures):
         row, column = divmod(index, grid)
         picture[row * tile : (row + 1) * tile, column * tile : (column + 1) * tile] = part
-    starts = np.cumsum([0, *(len(vertices) for vertices, _, _ in meshes)])
+    vertices, triangles = joined([(points, faces) for points, faces, _ in meshes])
     uvs = [
         (np.clip(uv, 0.5 / tile, 1 - 0.5 / tile) + np.array(divmod(cell, grid)[::-1])) / grid
         for (_, _, uv), cell in zip(meshes, cells, strict=True)
     ]
-    faces = [faces + start for (_, faces, _), start in zip(meshes, starts, strict=False)]
-    vertices = np.concatenate([vertices for vertices, _, _ in meshes])
-    return RawMesh(vertices, np.concatenate(faces), np.concatenate(uvs), picture)
+    return RawMesh(vertices, triangles, np.concatenate(uvs), picture)
+
+
+def joined(pieces: Sequence[Piece]) -> Piece:
+    """Several pieces as one."""
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])
+    faces = [faces + start for (_, faces), start in zip(pieces, starts, strict=False)]
+    return np.concatenate([vertices for vertices, _ in pieces]), np.concatenate(faces)
 
 
 def read_shapes(path: Path, inside: Callable[[Path], Path]) -> list[Piece]:
@@ -230,11 +234,6 @@ class _Inside:
     def keys(self) -> list[str]:
         """Nothing is listed: what a mesh does not name is not read."""
         return []
-
-
-def reads_meshes() -> bool:
-    """Whether the library that reads meshes is installed."""
-    return importlib.util.find_spec("trimesh") is not None
 
 
 @dataclass(frozen=True)

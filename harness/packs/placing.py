@@ -107,7 +107,7 @@ def read_model_data(path: Path) -> ModelData:
         {kind: _frames(said, kind, what) for kind in KEYS},
         None if said.extents is None else _three(said.extents, SIZES, f"{what} has the extents"),
         mass,
-        {kind: tuple(map(_link, said.points(kind))) for kind in KEYS},
+        {kind: tuple(_part(row, str, "") for row in said.points(kind)) for kind in KEYS},
     )
 
 
@@ -121,7 +121,8 @@ def _three(value: Three, bounds: tuple[float, float], what: str) -> Vec3:
 def _frames(said: _File, kind: str, what: str) -> Floats:
     """(n, 4, 4) frames of a kind of points, (0, 4, 4) if there are none."""
     try:
-        found = np.array([*map(_matrix, said.points(kind))], dtype=float).reshape(-1, 4, 4)
+        rows = [_part(row, list, row) for row in said.points(kind)]
+        found = np.array(rows, dtype=float).reshape(-1, 4, 4)
     except (TypeError, ValueError, OverflowError) as error:
         raise ArchiveError(f"{what} has {kind} points that are no 4x4 frames") from error
     if not np.isfinite(found).all() or np.abs(found).max(initial=0.0) > LARGEST:
@@ -129,16 +130,11 @@ def _frames(said: _File, kind: str, what: str) -> Floats:
     return found
 
 
-def _link(row: object) -> str:
-    """The link in whose frame a point is; "" if that is not said."""
+def _part(row: object, kind: type, default: Any) -> Any:
+    """Of a point of a model with joints its frame, a list, or the link in which that is, a text;
+    the points of others are frames alone."""
     values = row.values() if isinstance(row, dict) else ()
-    return next((value for value in values if isinstance(value, str)), "")
-
-
-def _matrix(row: object) -> object:
-    """The frame of a point; models with joints also name the link that it belongs to."""
-    values = row.values() if isinstance(row, dict) else ()
-    return next((value for value in values if isinstance(value, list)), row)
+    return next((value for value in values if isinstance(value, kind)), default)
 
 
 Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])

@@ -52,14 +52,10 @@ def storage_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise StorageError(_cannot_write(path, error)) from error
-
-
-def _cannot_write(path: Path, error: OSError) -> str:
-    why = error.strerror or str(error)
-    if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
-        return f"cannot write {path}: {why}"
-    return f"cannot write {path}: {why} ({_free(path.parent)} free in {path.parent}); make room"
+        text = f"cannot write {path}: {error.strerror or error}"
+        if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+            text += f" ({_free(path.parent)} free in {path.parent}); make room"
+        raise StorageError(text) from error
 
 
 def _free(folder: Path) -> str:

@@ -5,7 +5,7 @@ every attempt is on disk before it gets the trial, as the record of a loss that 
 driver would be, and a trial has a fixed number of them however often the run is resumed.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -29,14 +29,6 @@ def attempts_spent(retries: Retries) -> int:
 def earlier_retries(known: Mapping[TrialKey, TrialRecord]) -> dict[TrialKey, Retries]:
     """The attempts of earlier drivers at trials that have no result yet."""
     return {key: r.retries for key, r in known.items() if not finished(r) and r.retries}
-
-
-def spent_trials(
-    keys: Sequence[TrialKey], known: Mapping[TrialKey, TrialRecord], attempts: int
-) -> list[TrialKey]:
-    """Those of `keys` that have had all their `attempts` and stay without a result."""
-    retries = earlier_retries(known)
-    return [key for key in keys if attempts_spent(retries.get(key, ())) >= attempts]
 
 
 CUT_OFF = RetryRow(INTERRUPTED, "the run ended before the trial did")
@@ -90,7 +82,8 @@ def loss_record(key: TrialKey, message: str, retries: Retries, queue: TrialQueue
 
 
 FIRST = 5
-"""So many first trials of a task, or of the run, with the same error stop the run."""
+"""So many first trials of a task, or of the run, with the same error stop the run; so many first
+results are looked at for problems."""
 IN_A_ROW = 10
 """So many trials in a row with the same error at one server stop it later on."""
 ADVICE = (
@@ -146,13 +139,9 @@ class ErrorWatch:
         return None
 
 
-FIRST = 5
-"""So many results of a run are looked at."""
-
-
 @dataclass
 class ProblemWatch:
-    """Sees every result of a run as it comes."""
+    """Sees the first results of a run as they come."""
 
     _seen: list[TrialRecord] = field(default_factory=list)
 

@@ -18,7 +18,7 @@ from robospa.harness.factory import is_url
 from robospa.harness.pool import JobProcess, WorkerDied, WorkerStuck
 from robospa.harness.progress import Progress, summary
 from robospa.harness.running.atomic_file import replace_file, run_lock
-from robospa.harness.running.attempts import spent_trials
+from robospa.harness.running.attempts import attempts_spent, earlier_retries
 from robospa.harness.running.executor import RunAborted
 from robospa.harness.running.films import films_of, finish_films
 from robospa.harness.running.manifest import about_machine, add_processor, check_folder, open_run
@@ -150,7 +150,10 @@ def make_manifest(request: Request, policies: Mapping[str, ProbedPolicy]) -> Run
     if steps is not None:
         warnings.append(timing_warning(suite, steps, config.clock))
     settings = RunSettings(
-        **_shared(request.keys),
+        **{
+            name: tuple(sorted({getattr(key, name) for key in request.keys}))
+            for name in ("embodiment", "mode", "split")
+        },
         policy=one.settings(),
         privileged=any(spec.sees_state for spec in specs),
         needs_trial_key=any(spec.needs_trial_key for spec in specs),
@@ -175,13 +178,6 @@ def make_manifest(request: Request, policies: Mapping[str, ProbedPolicy]) -> Run
     )
     categories = {task: part.task.category for task, part in found.items()}
     return new_manifest(settings, request.keys, about, categories, suite)
-
-
-def _shared(keys: Sequence[TrialKey]) -> dict[str, tuple[str, ...]]:
-    return {
-        name: tuple(sorted({getattr(key, name) for key in keys}))
-        for name in ("embodiment", "mode", "split")
-    }
 
 
 def _renders(policies: Mapping[str, ProbedPolicy]) -> bool:
@@ -252,7 +248,8 @@ def evaluate(request: Request) -> None:
             for text in [*manifest.about.warnings, *lost, *loopback_warnings(executor, config)]:
                 progress.note(f"warning: {text}")
             attempts = request.options.attempts
-            if spent := set(spent_trials(missing, known, attempts)):
+            retries = earlier_retries(known)
+            if spent := {k for k in missing if attempts_spent(retries.get(k, ())) >= attempts}:
                 missing = [key for key in missing if key not in spent]
                 progress.note(
                     f"warning: {len(spent)} trials have had all {attempts} attempts and stay "

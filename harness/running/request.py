@@ -15,7 +15,7 @@ from robospa.harness.running.evaluate import Request
 from robospa.harness.running.policy_probe import read_map
 from robospa.harness.running.runner import RunOptions
 from robospa.harness.running.status import cores, most_workers
-from robospa.harness.running.worker import Targets, WorkerConfig
+from robospa.harness.running.worker import Targets, WorkerConfig, each
 from robospa.harness.selection import list_trials, seed_sources
 from robospa.harness.settings import (
     Compute,
@@ -63,7 +63,7 @@ def make_request(
     trials = list_trials(settings.selection) if keys is None else keys
     servers = check_servers(settings)
     policies = _policy_map(settings.policy_map, trials)
-    found = [*servers, *(t for ts in policies.values() for t in _each(ts))]
+    found = [*servers, *(t for ts in policies.values() for t in each(ts))]
     folder = run_folder(settings, resume)
     options = connect_arguments(found, settings.connection, token)
     one_trial = one_trial_servers(found)
@@ -189,10 +189,6 @@ def _policy_map(file: Path | None, keys: Sequence[TrialKey]) -> dict[str, Target
     from robospa.tasks.catalog import tasks
 
     return read_map(file, list(dict.fromkeys(key.task for key in keys)), tasks())
-
-
-def _each(targets: Targets) -> tuple[str, ...]:
-    return (targets,) if isinstance(targets, str) else targets
 
 
 def _clock(settings: EvaluationSettings) -> PolicyClock | None:

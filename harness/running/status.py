@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -43,7 +43,7 @@ class TimeBreakdown:
 
     def recent_shares(self) -> dict[str, float]:
         """Shares of the last trials; empty before the first."""
-        return _shares(_sum(self.recent))
+        return _shares(_sum(tuple(self.recent)))
 
     def overall_shares(self) -> dict[str, float]:
         """Shares of all trials."""
@@ -60,12 +60,8 @@ def split(record: TrialRecord) -> dict[str, float]:
     return spent
 
 
-def _sum(parts: Iterable[Mapping[str, float]]) -> dict[str, float]:
-    total: dict[str, float] = {}
-    for part in parts:
-        for name, seconds in part.items():
-            total[name] = total.get(name, 0.0) + seconds
-    return total
+def _sum(parts: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    return {n: sum(part.get(n, 0.0) for part in parts) for n in (*PURPOSES, "other")}
 
 
 def _shares(seconds: Mapping[str, float]) -> dict[str, float]:

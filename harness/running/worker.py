@@ -53,6 +53,11 @@ SWITCH_SECONDS = 0.0005
 gets the interpreter several times for each."""
 
 
+def each(targets: Targets) -> tuple[str, ...]:
+    """One by one."""
+    return (targets,) if isinstance(targets, str) else tuple(targets)
+
+
 def task_finder(parts: str) -> Callable[[TrialKey], Task]:
     """What finds the task of a trial: the catalog, unless `parts` are not ours.
 
@@ -103,14 +108,13 @@ class WorkerConfig:
 
     def targets(self, task: str) -> tuple[str, ...]:
         """URLs or names of the policies that can do `task`."""
-        found = self.policies[task] if self.policies else self.policy
-        return (found,) if isinstance(found, str) else tuple(found)
+        return each(self.policies[task] if self.policies else self.policy)
 
     @property
     def alone(self) -> bool:
         """Whether there is one policy for all trials."""
         found = self.policies.values() if self.policies else (self.policy,)
-        return len({t for f in found for t in ((f,) if isinstance(f, str) else f)}) == 1
+        return len({target for targets in found for target in each(targets)}) == 1
 
     def films(self, key: TrialKey, success: bool) -> bool:
         """Whether a film is to be made of `key`, which has ended in `success`."""

@@ -49,23 +49,18 @@ def attempt(world: World, policy: Policy, key: ListKey, seed: int, salt: str = "
     began = time.process_time()
     try:
         record = run_trial(world, policy, trial, policy_seed=0, parts=parts)
-    except SceneUnstable as error:
-        return _refused(seed, f"does not settle: {error}")
-    except LayoutError as error:
-        return _refused(seed, f"no layout: {error}")
     except Exception as error:
-        return _refused(seed, f"{type(error).__name__}: {error}")
+        known = {SceneUnstable: "does not settle", LayoutError: "no layout"}
+        said = (text for kind, text in known.items() if isinstance(error, kind))
+        return Attempt(seed, False, one_line(f"{next(said, type(error).__name__)}: {error}"))
     failures = "; ".join(getattr(policy, "failures", ()))
     reason = "" if record.success else f"{record.end} {record.message} {failures}"
     seconds = round(time.process_time() - began, 4)
-    return Attempt(seed, record.success, _line(reason), seconds)
+    return Attempt(seed, record.success, one_line(reason), seconds)
 
 
-def _refused(seed: int, reason: str) -> Attempt:
-    return Attempt(seed, False, _line(reason))
-
-
-def _line(text: str) -> str:
+def one_line(text: str) -> str:
+    """A reason as it is kept."""
     return " ".join(text.split())[:MOST_TEXT]
 
 
@@ -84,19 +79,8 @@ def expert(salt: str) -> Callable[[SeedJob], Attempt]:
 
 def expert_pool(workers: int, salt: str = "") -> Pool[SeedJob, Attempt]:
     """Processes that run the expert; a seed at which several of them die is refused."""
-
-    def crashed(job: SeedJob) -> Attempt:
-        return Attempt(job[1], False, CRASHED)
-
     start = partial(JobProcess, expert, salt, name="expert")
-    return Pool(start, max(1, workers), crashed=crashed)
-
-
-class _Where(msgspec.Struct):
-    """What a line says besides its attempt."""
-
-    level: int
-    inputs: str
+    return Pool(start, max(1, workers), crashed=lambda job: Attempt(job[1], False, CRASHED))
 
 
 class Evidence:
@@ -117,11 +101,11 @@ class Evidence:
             return found
         for line in path.read_bytes().split(b"\n"):
             try:
-                where = msgspec.json.decode(line, type=_Where)
-                item = msgspec.json.decode(line, type=Attempt)
+                row = msgspec.json.decode(line)
+                item = msgspec.convert(row, Attempt)
             except msgspec.DecodeError:
                 continue
-            if (where.level, where.inputs) == (key.level, inputs):
+            if (row.get("level"), row.get("inputs")) == (key.level, inputs):
                 found[item.seed] = item
         return found
 
