@@ -158,12 +158,9 @@ def test_a_policy_of_measured_joints_is_told_from_one_of_commands() -> None:
     assert MADE.measured is not None
     made = replace(MADE, commanded=MADE.measured)  # what it learned to follow
     late = replace(MADE, measured=MADE.measured)
-    findings = found(Learned(made, look=lambda seen: {**seen, "state": _at(seen, made)}), late)
+    knows = Learned(made, look=lambda seen: {**seen, "state": made.commanded[seen["step"]]})
+    findings = found(knows, late)
     assert findings.best is not None and findings.best.names == ("measured joints",)
-
-
-def _at(seen: dict[str, Any], made: Any) -> Any:
-    return made.commanded[seen["step"]]
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.03])
@@ -398,23 +395,14 @@ def go1(seen: Any) -> Any:
     return MADE.commanded[t + 1 : t + 1 + CHUNK] - MADE.commanded[t] + seen["state"][0]
 
 
-def check(url: str, demo: Path) -> tuple[int, str]:
-    done = robospa("check", url, "--trials", "0", "--load-seconds", "0", "--demo", demo)
-    return done.code, " ".join(done.out.split())
-
-
-@pytest.fixture
-def demo(tmp_path: Path) -> Path:
+def test_the_replay_names_the_option(tmp_path: Path) -> None:
     write_episode(tmp_path / "demo.hdf5", MADE)
-    return tmp_path / "demo.hdf5"
-
-
-def test_the_replay_names_the_option(demo: Path) -> None:
+    words = ("--trials", "0", "--load-seconds", "0", "--demo", tmp_path / "demo.hdf5")
     with standins.Go1(go1) as url:
-        code, out = check(url, demo)
-        assert code == 1 and "wrist images are swapped" in out and "option wrists" in out, out
-        code, out = check(url + "?wrists=swapped", demo)
-        assert code == 0 and "It fits the demonstration" in out, out
+        wrong, right = (robospa("check", url + more, *words) for more in ("", "?wrists=swapped"))
+    said = " ".join(wrong.out.split())
+    assert wrong.code == 1 and "wrist images are swapped" in said and "option wrists" in said, said
+    assert right.code == 0 and "It fits the demonstration" in right.out, right.out
 
 
 # ------- and through the servers of each preset, whose wires differ

@@ -16,6 +16,7 @@ from robospa.harness.packs.visuals import shaded, thinned
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.shapes import Mesh
 
+pytestmark = READS_MESHES
 Arrays = tuple[np.ndarray, np.ndarray]
 
 
@@ -85,20 +86,6 @@ def test_normals_are_sharp_at_edges_and_smooth_where_it_is_round() -> None:
     assert (vertices[:, :2] * normals[:, :2]).sum(axis=1) == pytest.approx(1, abs=1e-3)
 
 
-pytestmark = READS_MESHES
-HOLLOW = ("bowl", "bread_basket", "cup", "dustbin", "mug", "table_trash_bin")
-
-
-@pytest.fixture(scope="module")
-def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return make_archive(tmp_path_factory.mktemp("assets"), HOLLOW)
-
-
-@pytest.fixture(autouse=True)
-def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("ROBOSPA_CACHE", str(tmp_path / "cache"))
-
-
 @pytest.mark.parametrize("height", [0.1, 0.02])
 def test_depth_is_that_of_the_floor(height: float) -> None:
     """Of staves about y, their floor a tenth of their height thick."""
@@ -108,7 +95,12 @@ def test_depth_is_that_of_the_floor(height: float) -> None:
         assert convex.depth(pieces) == pytest.approx(share, abs=0.01)
 
 
-def test_a_model_in_one_node_is_filled_and_named_with_its_tasks(root: Path) -> None:
+def test_a_model_in_one_node_is_filled_and_named_with_its_tasks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROBOSPA_CACHE", str(tmp_path / "cache"))
+    hollow = ("bowl", "bread_basket", "cup", "dustbin", "mug", "table_trash_bin")
+    root = make_archive(tmp_path / "assets", hollow)
     found = index(open_archive(root))
     assert not found.filled and not found.filled_text()
     path = root / "objects" / "011_dustbin" / "collision" / "base0.glb"

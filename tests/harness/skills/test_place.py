@@ -17,7 +17,6 @@ from robospa.harness.skills.workspace import Workspace
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.objects import object_model
 from robospa.tasks.plan import Hang, Place, Pour
-from robospa.tasks.scene import Scene
 from robospa.workcell import TABLE_TOP, grasp_points
 
 HALF = 0.018
@@ -118,13 +117,14 @@ def test_a_thing_is_turned_by_the_wrist_and_not_by_swinging_the_whole_arm_over()
 UPWARDS = (0.0, 0.0, 1.0)
 
 
-def workspace(name: str, level: int) -> tuple[Scene, Workspace]:
-    scene = build_scene(name, level, 500_000)
-    return scene, at_home(ROBOT.name, *scene.objects)
+def hanging() -> tuple[Workspace, str, str]:
+    """A mug is to be hung: its name and the rack's."""
+    scene = build_scene("Hang_Mug_Stack_Blocks", 1, 500_000)
+    return at_home(ROBOT.name, *scene.objects), scene.facts["mug"], scene.facts["rack"]
 
 
 def test_a_path_ends_at_the_target_and_starts_where_it_is_told() -> None:
-    _, ws = workspace("Hang_Mug_Stack_Blocks", 1)
+    ws, _, _ = hanging()
     here = ws.snapshot.end_effector[1]
     target = bring_in.translated(here, (0.0, 0.05, 0.0))
     way = bring_in.approach_joints(
@@ -139,14 +139,13 @@ def test_a_path_ends_at_the_target_and_starts_where_it_is_told() -> None:
 
 
 def test_there_is_no_path_to_what_is_out_of_reach() -> None:
-    _, ws = workspace("Hang_Mug_Stack_Blocks", 1)
+    ws, _, _ = hanging()
     far = Pose((0.0, 3.0, 1.0))
     assert bring_in.approach_joints(ws, 1, Pose(), [far], [(0.0, 0.0, 0.0)], ws.joints[1]) is None
 
 
 def test_a_mug_is_brought_with_the_peg_through_its_handle() -> None:
-    scene, ws = workspace("Hang_Mug_Stack_Blocks", 1)
-    mug, rack = scene.facts["mug"], scene.facts["rack"]
+    ws, mug, rack = hanging()
     peg = ws.pose(rack) * ws.models[rack].frames["hang"]
     handle = ws.models[mug].frames["handle"]
     for target in bring_in._targets(peg, handle, bring_in.WOBBLES):
@@ -163,12 +162,11 @@ def test_a_mug_is_brought_with_the_peg_through_its_handle() -> None:
 def test_a_way_past_a_rack_is_free_only_where_the_hand_does_not_meet_it(
     aside: float, free: bool
 ) -> None:
-    scene, ws = workspace("Hang_Mug_Stack_Blocks", 1)
-    rack = scene.facts["rack"]
+    ws, _, rack = hanging()
     x, y, z = ws.snapshot.end_effector[1].position
     below = Pose((x + aside, y + 0.12, z - 0.15))  # the post goes through the fingers
     snapshot = replace(ws.snapshot, poses=ws.snapshot.poses | {rack: below})
-    here = Workspace(scene, ROBOT, snapshot)
+    here = Workspace(ws.scene, ROBOT, snapshot)
     narrow = bring_in.NarrowPassage(here, 1, rack, Pose())
     assert narrow.free([here.joints[1], here.joints[1]]) is free
 
@@ -177,20 +175,17 @@ def test_a_way_past_a_rack_is_free_only_where_the_hand_does_not_meet_it(
 def test_a_way_is_above_the_table_only_where_what_is_held_stays_so(
     below: float, above: bool
 ) -> None:
-    scene, ws = workspace("Hang_Mug_Stack_Blocks", 1)
+    ws, _, rack = hanging()
     end = ws.snapshot.end_effector[1]
     x, y, z = end.position
     assert (z - below > ws.scene.table_top + bring_in.MARGIN) is above
-    narrow = bring_in.NarrowPassage(
-        ws, 1, scene.facts["rack"], end.inverse() * Pose((x, y, z - below))
-    )
+    narrow = bring_in.NarrowPassage(ws, 1, rack, end.inverse() * Pose((x, y, z - below)))
     assert narrow.above_table([ws.joints[1], ws.joints[1]]) is above
 
 
 @pytest.mark.parametrize(("aside", "past"), [(0.0, False), (0.4, True)])
 def test_a_mug_is_carried_past_a_rack_only_where_they_do_not_meet(aside: float, past: bool) -> None:
-    scene, ws = workspace("Hang_Mug_Stack_Blocks", 1)
-    mug, rack = scene.facts["mug"], scene.facts["rack"]
+    ws, mug, rack = hanging()
     here, stands = ws.snapshot.end_effector[1], ws.pose(rack)
     x, y, _ = stands.position
     ws.held[1] = mug
@@ -200,9 +195,9 @@ def test_a_mug_is_carried_past_a_rack_only_where_they_do_not_meet(aside: float, 
 
 
 def test_targets_of_the_last_attempt_keep_the_handle_at_the_peg_and_turn_it_farther() -> None:
-    scene, ws = workspace("Hang_Mug_Stack_Blocks", 1)
-    peg = ws.pose(scene.facts["rack"]) * ws.models[scene.facts["rack"]].frames["hang"]
-    handle = ws.models[scene.facts["mug"]].frames["handle"]
+    ws, mug, rack = hanging()
+    peg = ws.pose(rack) * ws.models[rack].frames["hang"]
+    handle = ws.models[mug].frames["handle"]
     targets = bring_in._far_targets(peg, handle)
     under = bring_in.translated(peg, (0.0, 0.0, -bring_in.SAG)).position
     assert all((t * handle).position == pytest.approx(under, abs=1e-9) for t in targets)
@@ -214,7 +209,8 @@ def test_targets_of_the_last_attempt_keep_the_handle_at_the_peg_and_turn_it_fart
 
 
 def test_a_bin_is_emptied_upside_down_with_its_mouth_over_the_container() -> None:
-    scene, ws = workspace("Place_Phone_Press_Stapler", 5)
+    scene = build_scene("Place_Phone_Press_Stapler", 5, 500_000)
+    ws = at_home(ROBOT.name, *scene.objects)
     call = Pour(scene.facts["table_trash_bin"], into=scene.facts["dustbin"])
     model, container = ws.models[call.object], ws.models[call.into]
     middle = ws.pose(call.into).position
