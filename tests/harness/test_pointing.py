@@ -76,11 +76,6 @@ class Pointer:
         return [{"skill": "point", "at": at}]
 
 
-@pytest.fixture(scope="module")
-def world() -> SapienWorld:
-    return SapienWorld(render=True)
-
-
 def ask(world: SapienWorld, key: TrialKey, index: int) -> TrialRecord:
     """The record of a policy that points at object number `index`, or at the table (-1)."""
     pointer = Pointer(world, lambda shown: point_on(shown == index))

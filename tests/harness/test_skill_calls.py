@@ -25,11 +25,6 @@ HEAD = CameraSpec("head", 160, 120)
 CORNER = [0.01, 0.01]
 
 
-@pytest.fixture(scope="module")
-def world() -> SapienWorld:
-    return SapienWorld(render=True)
-
-
 class Says:
     """Answers `script`, one entry a query, with names in the place of points looked up in the
     picture of the moment; then it is done."""

@@ -9,6 +9,7 @@ from run_fakes import LIMIT, SPEC, FakePolicy, FakeWorld, parts
 
 from robospa.harness.trial import run_trial
 from robospa.harness.world import ActionProblem, Poll, SceneUnstable, StepResult
+from robospa.protocol.policy import PolicySpec
 from robospa.results.records.action_problems import UNREACHABLE
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
@@ -18,6 +19,17 @@ KEY = TrialKey("Pick_Fake", 2, 100004)
 
 def play(policy: FakePolicy, key: TrialKey = KEY, world: FakeWorld | None = None) -> TrialRecord:
     return run_trial(world or FakeWorld(), policy, key, policy_seed=7, parts=parts)
+
+
+class Answers(FakePolicy):
+    """The same to every query."""
+
+    def __init__(self, answer: object, spec: PolicySpec = SPEC) -> None:
+        super().__init__(spec)
+        self.answer = answer
+
+    def infer(self, observation: object) -> object:  # type: ignore[override]
+        return self.answer
 
 
 def queries(record: TrialRecord) -> tuple[object, object]:
@@ -38,11 +50,7 @@ def test_the_actions_digest_covers_exactly_the_executed_actions() -> None:
 
 
 def test_the_step_limit_cuts_the_last_chunk() -> None:
-    class Idle(FakePolicy):
-        def infer(self, observation: object) -> np.ndarray:
-            return np.zeros((3, 14), np.float32)
-
-    record = play(Idle())
+    record = play(Answers(np.zeros((3, 14), np.float32)))
     assert (record.end, record.success, record.steps) == ("step_limit", False, LIMIT)
     assert record.policy_calls == 7 and queries(record) == ({"2": 1, "3": 6}, 18)
 
@@ -95,33 +103,21 @@ def test_long_history_offsets_reach_back_over_chunks() -> None:
     ],
 )
 def test_a_bad_answer_is_a_failure_with_the_reason(answer: object, words: str) -> None:
-    class Bad(FakePolicy):
-        def infer(self, observation: object) -> object:  # type: ignore[override]
-            return answer
-
-    record = play(Bad())
+    record = play(Answers(answer))
     assert (record.end, record.success, record.steps) == ("policy_error", False, 0)
     assert words in record.message
 
 
 def test_an_action_that_cannot_be_executed_is_a_failure_with_the_reason() -> None:
-    class Flat(FakePolicy):
-        def infer(self, observation: object) -> np.ndarray:
-            return np.zeros((1, 16), np.float32)
-
-    record = play(Flat(replace(SPEC, action="ee")))
+    record = play(Answers(np.zeros((1, 16), np.float32), replace(SPEC, action="ee")))
     assert record.end == "policy_error"
     assert "left quaternion (w, x, y, z) of the ee action has length 0" in record.message
 
 
 def test_absurd_numbers_are_clipped_and_counted() -> None:
-    class Wild(FakePolicy):
-        def infer(self, observation: object) -> np.ndarray:
-            chunk = np.ones((4, 14), np.float32)
-            chunk[2] = 3.4e38
-            return chunk
-
-    record = play(Wild())
+    chunk = np.ones((4, 14), np.float32)
+    chunk[2] = 3.4e38
+    record = play(Answers(chunk))
     assert (record.end, record.steps) == ("success", 3)  # 1, 1 and at most pi
     assert record.diagnostics["clipped_joints"] == record.diagnostics["clipped_grippers"] == 1
     assert record.diagnostics["first_clipped_joint"].startswith("action 3: left joint 1 ")

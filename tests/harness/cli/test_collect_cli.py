@@ -8,7 +8,6 @@ import pytest
 from command_line import robospa
 from tiny_datasets import tiny_dataset
 
-from robospa.harness.convention_check.episodes import read_episode
 from robospa.harness.datasets import collect
 from robospa.harness.datasets.collect import CollectionResult
 
@@ -44,13 +43,3 @@ def test_what_was_verified_as_json(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     done = robospa(*words)
     (problem,) = json.loads(done.out)["folders"][str(tmp_path)]["problems"]
     assert done.code == 1 and problem.startswith("notes.txt is not part of the data set")
-
-
-@pytest.mark.sim
-def test_a_recorded_demonstration_has_its_pictures(tmp_path: Path) -> None:
-    out = tmp_path / "one.hdf5"
-    done = robospa("collect", "--record", "Pick_Blocks_Size", "--seed", 100_000, "--out", out)
-    assert done.code == 0 and "success" in done.out
-    episode = read_episode(out)
-    assert len(episode) > 50 and set(episode.frames) == {"head", "left_wrist", "right_wrist"}
-    assert robospa("collect", "--record", "Pick_Blocks_Size", "--out", out).code == 1
