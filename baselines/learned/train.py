@@ -13,7 +13,8 @@ import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
+from functools import cache, partial
+from itertools import chain
 from pathlib import Path
 from typing import Annotated
 
@@ -39,6 +40,9 @@ BATCH, PICTURES, EVERY = 64, 16, 200
 """States and pictures of a step; a line, and what can be gone on from, after so many steps."""
 RATES = {"point": (1e-3, 0.6), "find": (2e-3, 0.0), "measure": (2e-3, 0.0)}
 """Learning rates, reached in WARM steps, and the share of the steps after which they fall."""
+PARAPHRASES = Path(__file__).parent / "weights" / "paraphrases.txt"
+SAID_ANEW, LONGEST_PHRASE = (0.0, 0.5, 0.9), 9
+"""Shares of a sentence's phrases that are said in another way; words of the longest phrase."""
 WARM, QUICK = 100, 0.7
 """Perception is trained at lower precision in a share QUICK of its steps."""
 
@@ -126,7 +130,8 @@ class States:
         objects would be as right (B, N)."""
         chosen = [self._lessons[i] for i in np.searchsorted(self._reached[:-1], rng.random(count))]
         pairs = [(item, int(rng.integers(len(item.tokens)))) for item in chosen]
-        told = [self._vocabulary.numbers(o.told[rng.integers(len(o.told))]) for o in chosen]
+        said = [paraphrased(rng, o.told[rng.integers(len(o.told))]) for o in chosen]
+        told = [self._vocabulary.numbers(sentence) for sentence in said]
         known, meant = misheard(rng, np.stack(told), self._vocabulary)
         last = np.stack([item.last[i] for item, i in pairs]).astype(np.int64)
         seen = [misseen(rng, item.tokens[i]) for item, i in pairs]
@@ -137,6 +142,27 @@ class States:
         for row, others in zip(right, every, strict=True):
             row[others[:, 1].astype(int)] = others[0, 1] != NOTHING
         return batch, torch.from_numpy(np.stack(answers)), torch.from_numpy(right)
+
+
+@cache
+def paraphrases() -> dict[tuple[str, ...], list[str]]:
+    """Other ways to say runs of words of training sentences, written by readers of these alone."""
+    rows = [row.split(" = ") for row in PARAPHRASES.read_text().splitlines()]
+    return {tuple(point.words_of(said)): others.split(" | ") for said, others in rows}
+
+
+def paraphrased(rng: np.random.Generator, sentence: str) -> str:
+    """The words of a sentence, a share of its phrases said in another way."""
+    left, made = point.words_of(sentence), list[str]()
+    share = rng.choice(SAID_ANEW)
+    while left:
+        sizes = range(min(len(left), LONGEST_PHRASE), 0, -1)
+        known = (size for size in sizes if tuple(left[:size]) in paraphrases())
+        size = next((n for n in known if rng.random() < share), 0)
+        others = paraphrases()[tuple(left[:size])] if size else left[:1]
+        made.append(others[rng.integers(len(others))])
+        left = left[max(size, 1) :]
+    return " ".join(made)
 
 
 def misheard(
@@ -237,7 +263,9 @@ def _worker(argument: tuple[Path, TrainOptions]) -> Callable[[str], None]:
 
 def _point(out: Path, options: TrainOptions) -> None:
     lessons = [lesson(scene) for n in range(options.blocks) for scene in scenes.scenes(n)]
-    vocabulary = Vocabulary(point.vocabulary_of((s for item in lessons for s in item.told), 2))
+    told = (sentence for item in lessons for sentence in item.told)
+    words = point.vocabulary_of(chain(told, *paraphrases().values()), 2)
+    vocabulary = Vocabulary(words)
     states = States(lessons, vocabulary)
     torch.manual_seed(options.seed)
     network = PointNetwork(point.FIRST_WORD + len(vocabulary.words))

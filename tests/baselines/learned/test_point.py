@@ -10,7 +10,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from robospa.baselines.learned import point  # noqa: E402
+from robospa.baselines.learned import point, train  # noqa: E402
 from robospa.baselines.learned.perceive import save_weights  # noqa: E402
 from robospa.baselines.learned.scenes import lesson  # noqa: E402
 from robospa.baselines.learned.steps import TYPES, State, Step, labelled, taken  # noqa: E402
@@ -72,6 +72,21 @@ def test_nothing_is_moved_to_where_something_lies(
     monkeypatch.setattr(network, "heat_of", lambda *_: torch.from_numpy(heat)[None])
     place = pointer.next_step(state, "stack").place
     assert place is not None and far <= math.dist(place, lies) < far + point.CELL
+
+
+def test_phrases_of_training_sentences_are_said_in_other_ways(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    said = "Pick up the 2nd cup from left to right, quick."
+    rng, seen = np.random.default_rng(0), set[str]()
+    monkeypatch.setattr(train, "SAID_ANEW", (0.0,))
+    assert train.paraphrased(rng, said) == " ".join(point.words_of(said))
+    monkeypatch.setattr(train, "SAID_ANEW", (1.0,))
+    seen |= {train.paraphrased(rng, said) for _ in range(30)}
+    assert len(seen) > 10 and all(text.endswith(" quick") for text in seen)
+    assert not any("from left to right" in text or "right left" in text for text in seen)
+    longest = max(map(len, train.paraphrases()))
+    assert longest <= train.LONGEST_PHRASE and all(train.paraphrases().values())
 
 
 def test_a_loss_falls() -> None:
