@@ -2,13 +2,12 @@
 
 import hashlib
 import os
-import subprocess
 import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from command_line import printed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -32,12 +31,18 @@ DECODER = ActionDecoder(ROBOT)
 START = np.array([READY, READY])
 
 
-def ee_action(space: str = "ee") -> np.ndarray:
+def ee_action() -> np.ndarray:
     rows = []
     for chain in DECODER.chains:
         pose = end_effector(chain, READY)
         rows += [*pose.position, *pose.rotation, 0.5]
     return np.array(rows)
+
+
+def changed(place: Any, value: object, action: np.ndarray) -> np.ndarray:
+    """`action` with other numbers at `place`."""
+    action[place] = value
+    return action
 
 
 def test_joint_goals_are_the_numbers_sent() -> None:
@@ -61,12 +66,8 @@ def test_a_gripper_outside_its_range_is_clipped_and_reported() -> None:
     assert targets.gripper.tolist() == [0.0, 1.0]
     assert [problem.kind for problem in targets.problems] == [CLIPPED_GRIPPERS] * 2
     assert targets.problems[1].text == "right gripper is 1.5, not from 0 (closed) to 1 (open)"
-
-
-def test_the_gripper_of_a_pose_is_reported_too() -> None:
-    action = ee_action()
-    action[7] = 88.0  # millimetres, or a percentage
-    (problem,) = DECODER.decode(action, "ee", START).problems
+    # Of a pose too: millimetres, or a percentage.
+    (problem,) = DECODER.decode(changed(7, 88.0, ee_action()), "ee", START).problems
     assert problem.text == "left gripper is 88, not from 0 (closed) to 1 (open)"
 
 
@@ -77,27 +78,23 @@ def test_a_small_overshoot_is_no_problem() -> None:
     assert targets.gripper.tolist() == [0.0, 1.0] and targets.problems == ()
 
 
-def test_a_number_that_is_not_finite_is_named() -> None:
-    action = joint_action()
-    action[9] = np.nan
-    with pytest.raises(ActionError, match=r"right joint 3 \(index 9 of the joint action\) is nan"):
-        DECODER.decode(action, "joint", START)
-
-
-@pytest.mark.parametrize("shape", [(13,), (16,), (1, 14), ()])
-def test_a_wrong_length_is_refused(shape: tuple[int, ...]) -> None:
-    with pytest.raises(ActionError, match=r"shape \(14,\), got"):
-        DECODER.decode(np.zeros(shape), "joint", START)
-
-
-def test_an_unknown_space_is_refused() -> None:
-    with pytest.raises(ActionError, match="no action space 'torque'"):
-        DECODER.decode(joint_action(), "torque", START)
-
-
-def test_something_that_is_no_array_is_refused() -> None:
-    with pytest.raises(ActionError, match="not an array of numbers"):
-        DECODER.decode([[1.0], "x"], "joint", START)
+@pytest.mark.parametrize(
+    ("action", "space", "said"),
+    [
+        (
+            changed(9, np.nan, joint_action()),
+            "joint",
+            r"right joint 3 \(index 9 of the .*\) is nan",
+        ),
+        *((np.zeros(s), "joint", r"shape \(14,\), got") for s in ((13,), (16,), (1, 14), ())),
+        (joint_action(), "torque", "no action space 'torque'"),
+        ([[1.0], "x"], "joint", "not an array of numbers"),
+        (changed(slice(3, 7), 0.0, ee_action()), "ee", "left quaternion"),
+    ],
+)
+def test_what_is_no_action_is_refused(action: Any, space: str, said: str) -> None:
+    with pytest.raises(ActionError, match=said):
+        DECODER.decode(action, space, START)
 
 
 def test_the_pose_of_the_present_posture_is_no_motion() -> None:
@@ -116,41 +113,20 @@ def test_a_pose_nearby_is_reached() -> None:
 
 
 def test_an_arm_that_cannot_reach_holds_and_says_so() -> None:
-    action = ee_action()
-    action[:3] = (5.0, 5.0, 5.0)
-    targets = DECODER.decode(action, "ee", START)
+    targets = DECODER.decode(changed(slice(3), 5.0, ee_action()), "ee", START)
     assert np.array_equal(targets.joints[0], START[0])
     assert [problem.kind for problem in targets.problems] == [UNREACHABLE]
     assert "left arm cannot reach position (5.000, 5.000, 5.000)" in targets.problems[0].text
 
 
-def test_delta_moves_in_the_grippers_own_frame() -> None:
-    row = [0.02, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
-    targets = DECODER.decode(np.array(row * 2), "delta_ee", START)
+@pytest.mark.parametrize(("step", "near"), [(0.02, 2e-3), (1e-4, 1e-5), (0.0, 1e-12)])
+def test_delta_moves_in_the_grippers_own_frame(step: float, near: float) -> None:
+    row = [step, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+    joints = DECODER.decode(np.array(row * 2), "delta_ee", START).joints
     before = end_effector(DECODER.chains[0], READY)
-    after = end_effector(DECODER.chains[0], targets.joints[0])
-    assert after.position == pytest.approx(before.apply((0.02, 0.0, 0.0)), abs=2e-3)
-
-
-def test_an_identity_delta_moves_nothing() -> None:
-    row = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
-    targets = DECODER.decode(np.array(row * 2), "delta_ee", START)
-    assert targets.joints == pytest.approx(START, abs=1e-12)
-
-
-def test_a_tiny_delta_is_not_swallowed() -> None:
-    row = [1e-4, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
-    targets = DECODER.decode(np.array(row * 2), "delta_ee", START)
-    before = end_effector(DECODER.chains[0], READY)
-    after = end_effector(DECODER.chains[0], targets.joints[0])
-    assert after.position == pytest.approx(before.apply((1e-4, 0.0, 0.0)), abs=1e-5)
-
-
-def test_a_quaternion_of_no_length_is_refused() -> None:
-    action = ee_action()
-    action[3:7] = 0.0
-    with pytest.raises(ActionError, match="left quaternion"):
-        DECODER.decode(action, "ee", START)
+    after = end_effector(DECODER.chains[0], joints[0])
+    assert after.position == pytest.approx(before.apply((step, 0.0, 0.0)), abs=near)
+    assert step or joints == pytest.approx(START, abs=1e-12)
 
 
 def test_arms_may_have_different_joint_counts() -> None:
@@ -216,15 +192,7 @@ TARGETS = "c5874194efeeec69"
 def test_pose_actions_give_the_same_targets_on_every_processor() -> None:
     assert walked(DECODER) == TARGETS
     other = "import test_action_decoder as t; print(t.walked(t.DECODER))"
-    done = subprocess.run(
-        [sys.executable, "-c", other],
-        cwd=Path(__file__).parent,
-        env={**os.environ, **WITHOUT_AVX, "PYTHONPATH": os.pathsep.join(sys.path)},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.split() == [TARGETS]
+    assert printed(other, **WITHOUT_AVX, PYTHONPATH=os.pathsep.join(sys.path)) == f"{TARGETS}\n"
 
 
 def test_noise_in_inverse_kinematics_does_not_reach_the_targets(
@@ -274,22 +242,13 @@ def test_nothing_moves_by_more_than_half_a_step(actions: np.ndarray) -> None:
     assert moved.max() <= 0.5 / STEPS_PER_UNIT
 
 
-@pytest.mark.parametrize(
-    ("number", "rounded"),
-    [(0.1, 6554 / 65536), (1.0, 1.0), (-0.25, -0.25), (1e30, 32767.0), (-1e30, -32767.0)],
-)
-def test_single_numbers(number: float, rounded: float) -> None:
-    assert quantize(np.array([number], np.float32))[0] == rounded
-
-
-def test_minus_zero_becomes_zero() -> None:
-    rounded = quantize(np.array([-0.0, -1e-9], np.float32))
-    assert not np.signbit(rounded).any()
-
-
-@pytest.mark.parametrize("odd", [0.1, -0.0, np.nan, np.inf, 1e30])
-def test_what_is_not_on_the_grid_is_noticed(odd: float) -> None:
-    assert not is_quantized(np.array([odd], np.float32))
+def test_single_numbers() -> None:
+    given = np.array([0.1, 1.0, -0.25, 1e30, -1e30, -0.0, -1e-9], np.float32)
+    rounded = quantize(given)
+    assert rounded.tolist() == [6554 / 65536, 1.0, -0.25, 32767.0, -32767.0, 0.0, 0.0]
+    assert not np.signbit(rounded[-2:]).any()
+    odd = (0.1, -0.0, np.nan, np.inf, 1e30)
+    assert not any(is_quantized(np.array([number], np.float32)) for number in odd)
 
 
 class Watching(FakeWorld):
