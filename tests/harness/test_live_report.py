@@ -4,6 +4,7 @@ import http.client
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +20,7 @@ pytestmark = pytest.mark.usefixtures("no_figures")
 
 FILM = bytes(range(200))
 RECORDS = [shown("Pick_Blocks_Size", 1, n, n < 3, candidates=2) for n in range(4)]
+NEW = to_line(replace(RECORDS[0], key=replace(RECORDS[0].key, seed=900)))
 
 
 @pytest.fixture
@@ -42,15 +44,12 @@ def ask(
     server: ReportServer, path: str, method: str = "GET", **headers: str
 ) -> tuple[int, dict[str, str], bytes]:
     """Status, headers and body of an answer."""
-    connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=30)
-    try:
-        connection.request(
-            method, path, headers={k.replace("_", "-"): v for k, v in headers.items()}
-        )
+    given = {name.replace("_", "-"): value for name, value in headers.items()}
+    line = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=30)
+    with closing(line) as connection:
+        connection.request(method, path, headers=given)
         answer = connection.getresponse()
         return answer.status, dict(answer.headers), answer.read()
-    finally:
-        connection.close()
 
 
 def test_the_page_follows_the_records_and_writes_nothing(run: Path, server: ReportServer) -> None:
@@ -61,7 +60,7 @@ def test_the_page_follows_the_records_and_writes_nothing(run: Path, server: Repo
     assert "<script>alert" not in text
     assert ask(server, "/", If_None_Match=headers["ETag"])[0] == 304
     with (run / "trials" / "0000.jsonl").open("a") as file:
-        file.write(to_line(replace(RECORDS[0], key=replace(RECORDS[0].key, seed=900))))
+        file.write(NEW)
     status, changed, body = ask(server, "/", If_None_Match=headers["ETag"])
     assert status == 200 and "1 of 6 trials are missing" in body.decode()
     assert changed["ETag"] != headers["ETag"]
@@ -107,7 +106,7 @@ def test_a_page_that_took_long_is_given_again_for_a_while(
     monkeypatch.setattr(live_report, "PAUSE_FACTOR", 1e6)
     path = run / "trials" / "0000.jsonl"
     whole = path.read_bytes()
-    path.write_bytes(whole + to_line(replace(RECORDS[0], key=replace(RECORDS[0].key, seed=900))).encode())  # fmt: skip  # noqa: E501
+    path.write_bytes(whole + NEW.encode())
     first = ask(server, "/")[2]
     path.write_bytes(whole)
     assert ask(server, "/")[2] == first
@@ -121,37 +120,23 @@ def test_videos_are_served_whole_and_in_parts(server: ReportServer) -> None:
     assert ask(server, "/videos/a.mp4", Range="bytes=500-")[0] == 416
 
 
-@pytest.mark.parametrize(
-    ("wanted", "part"),
-    [
-        ("", (0, 199)),
-        ("bytes=0-", (0, 199)),
-        ("bytes=-50", (150, 199)),
-        ("bytes=5-9999", (5, 199)),
-        ("bytes=9-5", (9, 5)),
-        ("bytes=1-2,4-5", (0, 199)),
-        ("lines=1-2", (0, 199)),
-    ],
-)
-def test_ranges(wanted: str, part: tuple[int, int]) -> None:
-    assert byte_range(wanted, 200) == part
+def test_ranges() -> None:
+    for whole in ("", "bytes=0-", "bytes=1-2,4-5", "lines=1-2"):
+        assert byte_range(whole, 200) == (0, 199)
+    parts = [byte_range(f"bytes={wanted}", 200) for wanted in ("-50", "5-9999", "9-5")]
+    assert parts == [(150, 199), (5, 199), (9, 5)]
 
 
-@pytest.mark.parametrize(
-    "path",
-    ["/run.json", "/videos/../run.json", "/videos/%2e%2e/run.json", "/videos/", "//etc/passwd",
-     "/videos/%2fetc%2fpasswd", "/trials/0000.jsonl", "/videos/none.mp4"],
-)  # fmt: skip
-def test_nothing_else_is_served(server: ReportServer, path: str) -> None:
-    assert ask(server, path)[0] == 404
+PATHS = "run.json videos/../run.json videos/%2e%2e/run.json videos/ /etc/passwd trials/0000.jsonl"
+VIDEOS = "%2fetc%2fpasswd none.mp4 link.mp4"
 
 
-def test_a_link_out_of_the_run_is_not_followed(
-    run: Path, server: ReportServer, tmp_path: Path
-) -> None:
+def test_nothing_else_is_served(run: Path, server: ReportServer, tmp_path: Path) -> None:
+    """A link out of the run is not followed."""
     (tmp_path / "secret.mp4").write_bytes(b"x")
-    (run / "videos" / "b.mp4").symlink_to(tmp_path / "secret.mp4")
-    assert ask(server, "/videos/b.mp4")[0] == 404
+    (run / "videos" / "link.mp4").symlink_to(tmp_path / "secret.mp4")
+    for path in [*PATHS.split(), *(f"videos/{name}" for name in VIDEOS.split())]:
+        assert ask(server, f"/{path}")[0] == 404, path
 
 
 def test_other_names_of_this_machine_are_refused(server: ReportServer) -> None:

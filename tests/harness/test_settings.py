@@ -3,6 +3,7 @@
 import ast
 import inspect
 import json
+from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -151,9 +152,6 @@ def test_a_wrong_file_is_named_in_one_sentence(tmp_path: Path, text: str, reason
     with pytest.raises(SettingsError, match=rf"run\.toml: .*{reason}") as error:
         read_settings(write(tmp_path, text))
     assert "\n" not in str(error.value) and "secret" not in str(error.value)
-
-
-def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match=r"none\.toml: it cannot be read \(No such file"):
         read_settings(tmp_path / "none.toml")
 
@@ -186,13 +184,10 @@ def test_functions_of_the_command_line_stay_short() -> None:
 # ------------ what users write for tasks, levels and seeds, and what they are told when it is wrong
 
 
-def test_all_tasks_in_the_papers_order() -> None:
+def test_tasks_by_category_dimension_and_name() -> None:
     names = parse_tasks("all")
     assert len(names) == len(set(names)) >= 10
-    assert names[0] == "Pick_Blocks_Size"
-
-
-def test_tasks_by_category_dimension_and_name() -> None:
+    assert names[0] == "Pick_Blocks_Size", "the paper's order"
     assert "Pick_Blocks_Size" in parse_tasks("gac")
     assert set(parse_tasks("spatial")) | set(parse_tasks("procedural")) == set(parse_tasks("all"))
     assert parse_tasks("pick blocks size, GAC")[0] == "Pick_Blocks_Size"
@@ -212,26 +207,25 @@ def test_basic_grounding_is_no_part_of_all(monkeypatch: pytest.MonkeyPatch) -> N
     assert len(parse_tasks("all,basic")) == 16
 
 
-@pytest.mark.parametrize("text", ["", "Pick_Nothing_At_All", "XYZ"])
-def test_unknown_tasks_are_refused(text: str) -> None:
-    with pytest.raises(SettingsError):
-        parse_tasks(text)
-
-
-def test_levels() -> None:
+def test_levels_and_numbers_which_keep_their_order_and_lose_repetitions() -> None:
     assert parse_levels("1,3-5") == parse_levels("L1,L3-L5") == [1, 3, 4, 5]
-
-
-@pytest.mark.parametrize("text", ["0", "6", "", "2-1", "1-", "-1", "a", "1,,2", "1-99999999"])
-def test_levels_that_do_not_exist_are_refused(text: str) -> None:
-    with pytest.raises(SettingsError):
-        parse_levels(text)
-
-
-def test_numbers_keep_their_order_and_lose_repetitions() -> None:
     assert parse_numbers("5,3-4,5", "seeds") == [5, 3, 4]
     with pytest.raises(SettingsError, match="is more than"):
         parse_numbers(str(10**23), "seeds")
+
+
+LEVELS = ("0", "6", "", "2-1", "1-", "-1", "a", "1,,2", "1-99999999")
+TASKS = ("", "Pick_Nothing_At_All", "XYZ")
+
+
+@pytest.mark.parametrize(
+    ("parse", "text"), [*((parse_levels, t) for t in LEVELS), *((parse_tasks, t) for t in TASKS)]
+)
+def test_levels_and_tasks_that_do_not_exist_are_refused(
+    parse: Callable[[str], object], text: str
+) -> None:
+    with pytest.raises(SettingsError):
+        parse(text)
 
 
 @pytest.mark.parametrize("text", ["{", '{"A": {"1": [1.5]}}', '{"A": {"1": [-1]}}', "{}"])
@@ -253,20 +247,19 @@ def test_the_first_seeds_of_every_variant() -> None:
     assert {(k.embodiment, k.mode, k.split) for k in keys} == {("aloha-agilex", "clean", "train")}
 
 
-def test_a_variant_with_too_few_seeds_is_named() -> None:
-    with pytest.raises(SettingsError, match="Pick_Blocks_Size level 1 has 3 seeds, not 4"):
-        list_trials(Selection("Pick_Blocks_Size", "1", 4, "7-9,7"))
-
-
 @pytest.mark.parametrize(
     ("wrong", "sentence"),
     [
         (Selection(embodiment="nao"), r"no embodiment 'nao'; known are .*aloha-agilex"),
         (Selection(embodiment="aloha_agilex"), r"did you mean aloha-agilex\?"),
         (Selection(mode="cleen"), r"no scene mode 'cleen'; did you mean clean\?"),
+        (
+            Selection("Pick_Blocks_Size", "1", 4, "7-9,7"),
+            "Pick_Blocks_Size level 1 has 3 seeds, not 4",
+        ),
     ],
 )
-def test_robots_and_modes_that_are_not_installed_are_refused(
+def test_what_is_not_installed_and_a_variant_with_too_few_seeds_are_refused(
     wrong: Selection, sentence: str
 ) -> None:
     with pytest.raises(SettingsError, match=sentence):

@@ -31,16 +31,10 @@ def settings(**given: Any) -> EvaluationSettings:
     return updated(EvaluationSettings(), given)
 
 
-@pytest.mark.parametrize(
-    ("world", "name"),
-    [
-        ("sapien", "sapien"),
-        ("official?settle=official", "official"),
-        ("run_fakes:FakeWorld", "run_fakes:FakeWorld"),
-    ],
-)
-def test_a_kind_is_found_by_name_or_by_the_path_of_its_factory(world: str, name: str) -> None:
-    assert world_kind(world).name == name
+def test_a_kind_is_found_by_name_or_by_the_path_of_its_factory() -> None:
+    for world in ("sapien", "run_fakes:FakeWorld"):
+        assert world_kind(world).name == world
+    assert world_kind("official?settle=official").name == "official"
 
 
 @pytest.mark.parametrize("wrong", ["sapiens", "officials?x", ""])
@@ -101,21 +95,11 @@ def test_a_failing_check_says_why(check: Callable[[], str], words: str) -> None:
     assert (found.ok, found.detail, found.fix) == (False, words, "install one")
 
 
-@pytest.mark.parametrize(
-    ("version", "too_old"),
-    [
-        ("Mesa 22.3.6", True),
-        ("Mesa 24.2.8", True),
-        ("Mesa 24.3.0", False),
-        ("Mesa 25.0.7-2", False),
-    ],
-)
-def test_an_old_software_driver_is_recognised(version: str, too_old: bool) -> None:
-    assert Device("llvmpipe (LLVM 15)", "llvmpipe", version).too_old is too_old
-
-
-def test_a_gpu_driver_is_never_too_old() -> None:
-    assert not Device("GeForce", "NVIDIA", "535.1").too_old
+def test_an_old_software_driver_is_recognised() -> None:
+    for version in ("22.3.6", "24.2.8", "24.3.0", "25.0.7-2"):
+        found = Device("llvmpipe (LLVM 15)", "llvmpipe", f"Mesa {version}").too_old
+        assert found is (version < "24.3")
+    assert not Device("GeForce", "NVIDIA", "535.1").too_old  # never that of a GPU
 
 
 @pytest.mark.sim
@@ -185,6 +169,20 @@ class Moody(FakePolicy):
         return super().infer(observation) + 0.1 * next(self.count)
 
 
+class BrokenPolicy(FakePolicy):
+    def infer(self, observation: Any) -> Any:
+        raise RuntimeError("out of memory")
+
+
+class BrokenWorld(FakeWorld):
+    def load(self, scene: Any, contacts: bool = False) -> None:
+        raise RuntimeError("no device")
+
+
+def no_world() -> Any:
+    raise ImportError("no module named sapien")
+
+
 def test_a_correct_policy_gives_the_same_result_twice() -> None:
     first, second, executed = results(FakePolicy)
     assert (first.passed, second.passed) == (True, True)
@@ -206,45 +204,25 @@ def test_actions_that_the_robot_cannot_execute_are_a_hint() -> None:
     assert "action 1: left joint 1 is asked to go to 57.3" in executed.detail
 
 
-def test_a_broken_promise_of_seeds_fails() -> None:
-    found = results(lambda: Moody(replace(SPEC, seeded=True)))
-    assert [row.passed for row in found][:2] == [True, False]
-    assert "though seeds are honoured" in found[1].detail
-
-
-def test_without_a_promise_it_is_only_reported() -> None:
-    assert "seeds are not honoured" in results(Moody)[1].detail
-
-
-def test_a_policy_error_fails_and_ends_it() -> None:
-    (row,) = results(NanPolicy)
-    assert row.passed is False and "nan" in row.detail
-
-
-def test_a_server_that_fails_is_reported() -> None:
-    class Fails(FakePolicy):
-        def infer(self, observation: Any) -> Any:
-            raise RuntimeError("out of memory")
-
-    (row,) = results(Fails)
-    assert row.passed is False and "out of memory" in row.detail
-
-
-def test_a_machine_that_cannot_simulate_is_not_the_servers_fault() -> None:
-    def missing() -> Any:
-        raise ImportError("no module named sapien")
-
-    def broken() -> Any:
-        raise RuntimeError("no device")
-
-    assert [row.passed for row in results(FakePolicy, missing)] == [None]
-    (row,) = results(FakePolicy, lambda: Unhappy())
-    assert row.passed is None and "robospa check" in row.detail
-
-
-class Unhappy(FakeWorld):
-    def load(self, scene: Any, contacts: bool = False) -> None:
-        raise RuntimeError("no device")
+@pytest.mark.parametrize(
+    ("make", "world", "verdicts", "said"),
+    [
+        (lambda: Moody(replace(SPEC, seeded=True)), FakeWorld, [True, False], "though seeds are h"),
+        (Moody, FakeWorld, [True, True], "seeds are not honoured"),
+        (NanPolicy, FakeWorld, [False], "nan"),
+        (BrokenPolicy, FakeWorld, [False], "out of memory"),
+        # A machine that cannot simulate is not the server's fault.
+        (FakePolicy, no_world, [None], "there is no simulator here"),
+        (FakePolicy, BrokenWorld, [None], "see robospa check"),
+    ],
+)
+def test_trials_that_differ_or_fail(
+    make: Callable[[], Any], world: Any, verdicts: list[bool | None], said: str
+) -> None:
+    found = results(make, world)
+    assert len(found) == len(verdicts) + (len(verdicts) > 1)  # the actions are looked at last
+    assert [row.passed for row in found[:2]] == verdicts
+    assert said in found[len(verdicts) - 1].detail
 
 
 def test_the_trial_fits_the_robot_of_the_policy() -> None:
