@@ -8,7 +8,8 @@ import hashlib
 import os
 import signal
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,6 +35,7 @@ from robospa.trial import TrialKey
 if TYPE_CHECKING:
     from robospa.harness.running.evaluate import Request
     from robospa.harness.running.worker import WorkerConfig
+    from robospa.results.records.trial_record import TrialRecord
 
 HERE = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
 DECODER = ActionDecoder(embodiment("aloha-agilex"))
@@ -162,6 +164,19 @@ def parts(key: TrialKey, salt: str = "") -> TrialSetup:
 
 def fake_task_of(key: TrialKey) -> Task:
     return parts(key).task
+
+
+def run_here(config: "WorkerConfig", keys: Iterable[TrialKey]) -> "list[TrialRecord]":
+    """The records of `keys`, one after the other by one worker in this process."""
+    from robospa.harness.running.record_store import RecordWriter
+    from robospa.harness.running.worker import Worker
+
+    (config.folder / "actions").mkdir(parents=True, exist_ok=True)
+    with (
+        closing(RecordWriter(config.folder)) as writer,
+        closing(Worker(config, writer)) as worker,
+    ):
+        return [worker.run(key, config.targets(key.task)[0]) for key in keys]
 
 
 class FakePolicy:

@@ -6,10 +6,9 @@ from typing import Any
 
 import pytest
 from command_line import robospa
+from run_fakes import run_here
 
 from robospa.harness.running import evaluate as running
-from robospa.harness.running.record_store import RecordWriter
-from robospa.harness.running.worker import Worker
 
 WORDS = [
     "eval",
@@ -37,24 +36,14 @@ class Inline:
         return None
 
     def run(self) -> None:
-        for name in ("trials", "actions"):
-            (self.config.folder / name).mkdir(exist_ok=True)
-        writer = RecordWriter(self.config.folder)
-        worker = Worker(self.config, writer)
-        for key in self.keys:
-            self.on_record(worker.run(key, "clock_fakes:walker"))
-        worker.close()
-        writer.close()
+        for record in run_here(self.config, self.keys):
+            self.on_record(record)
 
 
 @pytest.fixture(autouse=True)
-def one_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    from clock_fakes import TargetWorld
-
+def one_process(monkeypatch: pytest.MonkeyPatch, world_asked_here: None) -> None:
     monkeypatch.setattr(running, "Runner", Inline)
     monkeypatch.setattr(running, "summary", lambda shares, status: [])
-    world = lambda config, render: dict(TargetWorld(**config.world_arguments).info())  # noqa: E731
-    monkeypatch.setattr(running, "probe_world", world)
 
 
 def test_one_command_gives_runs_a_table_and_a_figure(tmp_path: Path) -> None:

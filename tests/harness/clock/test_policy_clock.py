@@ -39,6 +39,7 @@ from robospa.harness.running.record_store import ActionRecorder
 from robospa.harness.server_checks import measure
 from robospa.harness.trial import run_trial
 from robospa.protocol.errors import WireError
+from robospa.protocol.policy import PolicySpec
 from robospa.protocol.server import ServerThread
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
@@ -126,10 +127,20 @@ def test_a_file_that_is_no_latency_is_named(tmp_path: Path, text: str) -> None:
         read_latency(file)
 
 
-@pytest.mark.parametrize("text", ["real", "real:", "fast", "paused:200ms"])
-def test_a_clock_that_does_not_exist_is_refused(text: str) -> None:
-    with pytest.raises(ClockError, match="real:200ms"):
-        declared_latency(text)
+CLOCKS = ("real", "real:", "fast", "paused:200ms")
+RULES = ("", "after", "after:0", "wait:2", "arrival:2", "blend", "rtc:-1")
+
+
+@pytest.mark.parametrize(
+    ("read", "text", "known"),
+    [
+        *((declared_latency, text, "real:200ms") for text in CLOCKS),
+        *((parse_switching, text, "after:K") for text in RULES),
+    ],
+)
+def test_others_are_refused_with_those_there_are(read: Any, text: str, known: str) -> None:
+    with pytest.raises(ClockError, match=known):
+        read(text)
 
 
 def chunk(first: float, length: int = 4) -> np.ndarray:
@@ -156,12 +167,6 @@ def taken(remaining: Remaining) -> float | None:
 def test_rules_are_read(text: str, rule: Switching) -> None:
     assert parse_switching(text) == rule
     assert parse_switching(str(rule)) == rule
-
-
-@pytest.mark.parametrize("text", ["", "after", "after:0", "wait:2", "arrival:2", "blend", "rtc:-1"])
-def test_others_are_refused_with_those_there_are(text: str) -> None:
-    with pytest.raises(ClockError, match="after:K"):
-        parse_switching(text)
 
 
 def test_waiting_executes_a_chunk_to_its_end_and_no_further_than_the_spec_says() -> None:
@@ -254,11 +259,9 @@ def without_times(record: TrialRecord) -> TrialRecord:
 def test_without_latency_it_is_the_paused_clock_at_the_same_rate(
     switching: str, execute: int | None
 ) -> None:
-    paused = play(Walker(execute=execute), None)
-    assert without_times(play(Walker(execute=execute), real("0", switching))) == without_times(
-        paused
-    )
-    assert paused.success
+    clocks = (None, real("0", switching))
+    paused, timed = (without_times(play(Walker(execute=execute), clock)) for clock in clocks)
+    assert timed == paused and paused.success
 
 
 def test_waiting_holds_for_every_answer() -> None:
@@ -300,10 +303,10 @@ def test_the_time_that_a_step_limit_takes_is_the_time_limit() -> None:
 
 def test_a_longer_time_limit_leaves_the_limit_of_actions() -> None:
     assert play(Walker(), real("300ms", seconds=60.0)).success
-    record = play(Walker(length=1), real("60ms", seconds=60.0), TrialKey("Pick_Fake", 2, 100009))
+    far = replace(KEY, seed=100009)
+    record = play(Walker(length=1), real("60ms", seconds=60.0), far)
     assert record.success  # exactly as many actions as the limit has
     assert (record.steps, record.diagnostics[ENTRY]["held"]) == (2 * LIMIT, LIMIT)
-    far = TrialKey("Pick_Fake", 2, 100009)
     slow = Walker()
     slow.infer = lambda seen: np.asarray(seen["state"], np.float32)[None]  # type: ignore[method-assign]
     record = play(slow, real("60ms", seconds=60.0), far)
@@ -312,9 +315,8 @@ def test_a_longer_time_limit_leaves_the_limit_of_actions() -> None:
 
 def test_latencies_of_a_trial_do_not_depend_on_what_ran_before() -> None:
     clock = real("p0=0ms,p100=400ms", "arrival")
-    other = TrialKey("Pick_Fake", 1, 100007)
     alone = play(Walker(), clock)
-    play(Walker(), clock, other, seed=8)
+    play(Walker(), clock, replace(KEY, level=1, seed=100007), seed=8)
     assert without_times(play(Walker(), clock)) == without_times(alone)
     assert alone.diagnostics[ENTRY]["max_latency_ms"] <= 400
 
@@ -375,20 +377,15 @@ def test_a_robot_that_is_told_poses_holds_before_its_first_action(space: str) ->
             row[:, 3] = 1.0
             return np.tile(row.reshape(-1), (3, 1))
 
-    policy = Poses()
-    policy.spec = replace(policy.spec, action=space, action_dim=16)
-    world = TargetWorld()
-    seen = world.observe
-    world.observe = lambda spec: {**seen(spec), "ee": HOME_POSES}  # type: ignore[method-assign]
-    record = run_trial(world, policy, KEY, policy_seed=7, parts=parts, clock=real("60ms"))
+    class Posed(TargetWorld):
+        def observe(self, spec: PolicySpec) -> dict[str, Any]:
+            poses = [[side, -0.1, 0.9, 1.0, 0.0, 0.0, 0.0, 1.0] for side in (-0.3, 0.3)]
+            return {**super().observe(spec), "ee": np.array(poses, np.float32)}
+
+    policy = Poses(replace(Poses().spec, action=space, action_dim=16))
+    record = run_trial(Posed(), policy, KEY, policy_seed=7, parts=parts, clock=real("60ms"))
     assert record.end == "time_limit"
     assert record.diagnostics[ENTRY]["held"] == LIMIT // 4
-
-
-HOME_POSES = np.array(
-    [[-0.3, -0.1, 0.9, 1.0, 0.0, 0.0, 0.0, 1.0], [0.3, -0.1, 0.9, 1.0, 0.0, 0.0, 0.0, 1.0]],
-    np.float32,
-)
 
 
 # ----------- A server's latency under one, four and eight clients, and the clock that stands for it

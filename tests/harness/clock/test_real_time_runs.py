@@ -6,18 +6,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from clock_fakes import TargetWorld
 from fake_runs import make_run, shown
 from msgspec import structs
+from run_fakes import fake_config, run_here, trial_keys
 
 from robospa.harness.clock.policy_clock import PolicyClock, parse_latency, parse_switching
 from robospa.harness.clock.real_time import ENTRY
-from robospa.harness.running import evaluate
-from robospa.harness.running.evaluate import about_machine, make_manifest
-from robospa.harness.running.policy_probe import ProbedPolicy, check_clock, probe_policies
-from robospa.harness.running.record_store import RecordWriter
+from robospa.harness.running.evaluate import Request, about_machine, make_manifest
+from robospa.harness.running.policy_probe import check_clock, probe_policies
 from robospa.harness.running.request import make_request
-from robospa.harness.running.worker import Worker, WorkerConfig
 from robospa.harness.settings import EvaluationSettings, SettingsError, updated
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.rules import Reference, check_settings
@@ -32,7 +29,7 @@ from robospa.results.report.run_card import score_table
 from robospa.results.scoring.models import IncomparableError, results_of_run
 from robospa.trial import TrialKey
 
-KEYS = [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(6)]
+KEYS = trial_keys(6)
 
 
 def settings(out: Path, **given: Any) -> EvaluationSettings:
@@ -40,28 +37,18 @@ def settings(out: Path, **given: Any) -> EvaluationSettings:
     return updated(EvaluationSettings(), {**own, "world": "clock_fakes:TargetWorld", **given})
 
 
-def manifest_of(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, **given: Any
-) -> tuple[dict[str, Any], Any]:
+def manifest_of(out: Path, **given: Any) -> tuple[dict[str, Any], Request]:
     """The manifest of a run of fakes, and its request."""
-    request = make_request(settings(tmp_path / "run", **given), keys=KEYS)
-    monkeypatch.setattr(
-        evaluate,
-        "probe_world",
-        lambda config, render: dict(TargetWorld(**config.world_arguments).info()),
-    )
-    policies: dict[str, ProbedPolicy] = dict(probe_policies(request.config, KEYS, 0.0))
-    return make_manifest(request, policies).to_json(), request
+    request = make_request(settings(out, **given), keys=KEYS)
+    return make_manifest(request, probe_policies(request.config, KEYS)).to_json(), request
 
 
-def test_the_manifest_has_the_latency_itself_and_a_suite_of_its_own(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures("world_asked_here")
+def test_the_manifest_has_the_latency_itself_and_a_suite_of_its_own(tmp_path: Path) -> None:
     file = tmp_path / "measured.json"
     file.write_text(json.dumps({"latency_ms": [100.0, 200.0, 500.0]}))
-    made, request = manifest_of(
-        tmp_path, monkeypatch, action_rate=16.67, clock=f"real:{file}", switch="after:4"
-    )
+    given = {"action_rate": 16.67, "clock": f"real:{file}", "switch": "after:4"}
+    made, request = manifest_of(tmp_path / "run", **given)
     assert made["settings"]["clock"] == {
         "latency": "p0=100ms,p50=200ms,p100=500ms",
         "latency_ms": None,
@@ -72,16 +59,15 @@ def test_the_manifest_has_the_latency_itself_and_a_suite_of_its_own(
     assert made["suite"].endswith("-16.67hz")
     assert made["about"]["arguments"]["clock"] == "real:p0=100ms,p50=200ms,p100=500ms"
     assert any("every action takes 60 ms, in real time" in w for w in made["about"]["warnings"])
-    assert request.config.clock.latency == parse_latency("p0=100ms,p50=200ms,p100=500ms")
+    clock = request.config.clock
+    assert clock is not None and clock.latency == parse_latency("p0=100ms,p50=200ms,p100=500ms")
 
 
-def test_the_paused_clock_leaves_no_trace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    made, request = manifest_of(tmp_path, monkeypatch, action_rate=50)
-    assert "clock" not in made["settings"]
-    assert (
-        made["suite"].endswith("-50hz")
-        and made["settings"]["world"]["arguments"]["action_steps"] == 5
-    )
+@pytest.mark.usefixtures("world_asked_here")
+def test_the_paused_clock_leaves_no_trace(tmp_path: Path) -> None:
+    made, request = manifest_of(tmp_path, action_rate=50)
+    assert "clock" not in made["settings"] and made["suite"].endswith("-50hz")
+    assert made["settings"]["world"]["arguments"]["action_steps"] == 5
     assert request.config.clock is None
 
 
@@ -116,23 +102,9 @@ def test_a_rate_sets_the_duration_of_actions_in_the_built_in_world(tmp_path: Pat
 
 
 def run_all(folder: Path, keys: list[TrialKey]) -> list[TrialRecord]:
-    """All of `keys`, one after the other in one worker."""
-    config = WorkerConfig(
-        folder,
-        "clock_fakes:walker",
-        world="clock_fakes:TargetWorld",
-        parts="run_fakes:parts",
-        clock=PolicyClock(parse_latency("p0=0ms,p100=400ms")),
-    )
-    for name in ("trials", "actions"):
-        (folder / name).mkdir(parents=True)
-    writer = RecordWriter(folder)
-    worker = Worker(config, writer)
-    try:
-        return [worker.run(key, "clock_fakes:walker") for key in keys]
-    finally:
-        worker.close()
-        writer.close()
+    clock = PolicyClock(parse_latency("p0=0ms,p100=400ms"))
+    fakes = {"policy": "clock_fakes:walker", "world": "clock_fakes:TargetWorld"}
+    return run_here(fake_config(folder, **fakes, clock=clock), keys)
 
 
 def test_records_are_equal_to_the_bit_whatever_the_worker_and_the_order(tmp_path: Path) -> None:
