@@ -38,8 +38,3 @@ def test_a_torn_file_is_one_sentence(tmp_path: Path) -> None:
     data = json.loads(robospa(*ASSETS, root, "--json").out)
     assert "unpack the archive again" in data["faults"]["071_can/base3"]
     assert data["missing"]["Pick_Cans_Relational"] == ["071_can"]
-
-
-def test_without_a_folder_it_says_how_to_name_one() -> None:
-    code, _, err = robospa(*ASSETS)
-    assert code == 1 and "`robospa official assets DIR --add`" in err

@@ -38,15 +38,6 @@ def test_a_wrong_one_fails_with_the_mistake_in_a_sentence_and_a_table(demo: Path
     assert "left gripper" in out and "as it is" in out and "can be evaluated" not in out
 
 
-def test_a_file_that_cannot_be_read_is_one_sentence_before_the_server_is_asked(
-    tmp_path: Path,
-) -> None:
-    (tmp_path / "no.hdf5").write_text("no")
-    code, out, err = robospa("check", "ws://127.0.0.1:9", "--demo", tmp_path / "no.hdf5")
-    assert code == 1 and not out
-    assert err.count("\n") == 1 and "cannot be read as an HDF5 demonstration" in err
-
-
 class Begins(Learned):
     """Answers a chunk that begins near the state it is shown, in conventions of its own."""
 

@@ -55,25 +55,6 @@ def test_sample_sizes() -> None:
     assert set(found["half_widths"]["10"]) == {"RDT", "GO-1", "pi0.5", "X-VLA"}
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["compare"], "compare needs two sides"),
-        (
-            ["compare", "nowhere", "RDT"],
-            "there is no folder nowhere, and no published model is called",
-        ),
-        (["compare", "pi06", "RDT"], "did you mean pi0.5? there are RDT, GO-1, pi0.5, X-VLA"),
-        (["report", "nowhere", "--lint"], "nowhere is not a run"),
-    ],
-)
-def test_mistakes_are_one_sentence(words: list[str], said: str) -> None:
-    code, _, error = robospa(*words)
-    assert code == 1
-    assert said in error
-    assert error.count("\n") == 1
-
-
 def test_lint_of_the_paper_fails_with_its_findings() -> None:
     code, text, _ = robospa("report", "paper", "--lint")
     assert code == 1
@@ -91,25 +72,6 @@ def test_all_tables_are_written_and_the_errata_told(tmp_path: Path) -> None:
     assert "main, RRR, X-VLA, Drop: printed 28.2, recomputed 26.2" in out
     names = {path.name for path in (tmp_path / "paper").iterdir()}
     assert {"tables.md", "tables.tex", "tables.html", "tables.csv", "main.tex"} <= names
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("--format", "pdf"), "no format is called 'pdf'; there are md, tex, html, csv and all"),
-        (("--table", "mian"), "no table is called 'mian'; there are main,"),
-        (("--mark", "bold"), "no mark is called 'bold'; there are tied, highest, none"),
-        (("--run", "nowhere"), "nowhere is not a run"),
-    ],
-)
-def test_mistakes_are_one_sentence_and_write_nothing(
-    tmp_path: Path, words: tuple[str, ...], said: str
-) -> None:
-    code, out, err = robospa("paper", "--out", str(tmp_path / "p"), *words)
-    assert (code, out) == (1, "")
-    assert said in err
-    assert len(err.splitlines()) == 1
-    assert not (tmp_path / "p").exists()
 
 
 # --------------- help as wide as the terminal, completion by the shell, and JSON for other programs

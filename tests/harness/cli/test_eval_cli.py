@@ -153,35 +153,6 @@ def test_ctrl_c_leaves_a_run_that_can_be_resumed(tmp_path: Path) -> None:
     assert len(records) == len({r.key for r in records}) == 120
 
 
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        (["ws://127.0.0.1:9"], "127.0.0.1:9"),
-        (["nobody"], "no policy 'nobody'"),
-        (["run_fakes:FakePolicy", "--levels", "6"], "no level 6"),
-        (["run_fakes:FakePolicy", "--levels", "x"], "neither a number nor a range"),
-        (["run_fakes:FakePolicy", "--tasks", "Pick_Block_Size"], "did you mean Pick_Blocks_Size"),
-        (["run_fakes:FakePolicy", "--seeds", "nowhere.json"], "neither a file nor a list"),
-        (["run_fakes:FakePolicy", "--trials", "9"], "has 4 seeds, not 9"),
-        (["run_fakes:FakePolicy", "--config", "no.toml"], "no.toml: it cannot be read"),
-        (["run_fakes:FakePolicy", "--video", "some"], "not one of none, failures, first, all"),
-        (["run_fakes:FakePolicy", "--split", "test"], "not one of heldout, train"),
-        (["run_fakes:FakePolicy", "--world", "run_fakes:Broken"], "robospa check"),
-        (["run_fakes:FakePolicy", "--embodiment", "nao"], "no embodiment 'nao'; known are"),
-        (["run_fakes:FakePolicy", "--mode", "cleen"], "did you mean clean?"),
-        (["run_fakes:picky"], "drives only-me, not aloha-agilex"),
-    ],
-)
-def test_every_refusal_is_one_sentence_and_writes_nothing(
-    tmp_path: Path, words: list[str], sentence: str
-) -> None:
-    out = tmp_path / "run"
-    code, _, err = robospa(*eval_words(out, *words))
-    assert code == 1 and sentence in err
-    assert len(err.strip().splitlines()) == 1
-    assert not out.exists()
-
-
 @quickly
 def test_a_run_is_repeated_from_the_settings_that_it_keeps(tmp_path: Path) -> None:
     first, again = tmp_path / "first", tmp_path / "again"

@@ -61,14 +61,3 @@ def test_one_command_gives_runs_a_table_and_a_figure(tmp_path: Path) -> None:
     }  # fmt: skip
     code, out, _ = robospa(*WORDS, *words, "--resume", "--json")
     assert code == 0 and json.loads(out)["points"] == data["points"]
-
-
-@pytest.mark.parametrize("latencies", ["0", "200,100", "0,x", "-5,10", "0,0"])
-def test_latencies_that_make_no_curve_are_refused(latencies: str, tmp_path: Path) -> None:
-    code, _, err = robospa(*WORDS, f"--latency={latencies}", "--out", tmp_path)
-    assert code == 1 and "no growing milliseconds" in err
-
-
-def test_a_folder_is_needed() -> None:
-    code, _, err = robospa(*WORDS, "--latency", "0,100")
-    assert code == 1 and "--out" in err

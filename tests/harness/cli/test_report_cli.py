@@ -16,22 +16,6 @@ from robospa.trial import TrialKey
 pytestmark = pytest.mark.usefixtures("same_figures_once")
 
 
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        (["a", "--ci", "wald"], "no interval is called 'wald'; there are wilson, exact"),
-        (["a", "b"], "belongs to none of them; say where with --out"),
-        (["a"], "a is not a run: it has no run.json"),
-        (["a", "--failures"], "a is not a run: it has no run.json"),
-        (["a", "b", "--audit"], "are of one run"),
-    ],
-)
-def test_refusals(words: list[str], sentence: str, tmp_path: Path) -> None:
-    done = robospa("report", *(tmp_path / w if w in "ab" else w for w in words))
-    assert done.code == 1 and sentence in done.err
-    assert done.err.count("\n") == 1
-
-
 LIFT = {"time": 3.0, "kind": "grasped", "object": "b", "index": -1, "note": "", "step": 4}
 
 
@@ -81,13 +65,3 @@ def test_the_runs_of_a_folder_are_found(folder: Path) -> None:
     shutil.copytree(folder, folder.parent / "runs" / "mine")
     assert robospa("report", folder.parent / "runs").code == 0
     assert (folder.parent / "runs" / "report" / "report.html").exists()
-
-
-def test_submit_with_a_run_packs_it_and_with_a_bundle_verifies_it(tmp_path: Path) -> None:
-    (tmp_path / "x.zip").write_bytes(b"none")
-    assert "--model" in robospa("submit", tmp_path).err
-    assert "x.zip" in robospa("submit", tmp_path / "x.zip").err
-
-
-def test_two_folders_for_a_data_set_are_refused(tmp_path: Path) -> None:
-    assert "two folders" in robospa("collect", tmp_path / "a", "--out", tmp_path / "b").err

@@ -174,11 +174,6 @@ def test_it_shows_a_run_for_a_while(tmp_path: Path) -> None:
     assert done.code == 0 and "http://127.0.0.1:" in done.out
 
 
-def test_what_is_no_run_is_one_sentence(tmp_path: Path) -> None:
-    done = robospa("view", tmp_path)
-    assert done.code == 1 and "is not a run" in done.err
-
-
 # ---------- `--json`: every command that reports has it, and standard output is then one JSON value
 
 

@@ -1,0 +1,124 @@
+"""What a user who got something wrong is told: one sentence that says what to do, and nothing is
+written."""
+
+import socket
+from pathlib import Path
+
+import pytest
+from command_line import eval_words, robospa
+from run_fakes import FakePolicy
+
+from robospa import extras
+from robospa.protocol.server import ServerThread
+
+REFUSED = [
+    ("compare", "compare needs two sides"),
+    ("compare nowhere RDT", "there is no folder nowhere, and no published model is called"),
+    ("compare pi06 RDT", "did you mean pi0.5? there are RDT, GO-1, pi0.5, X-VLA"),
+    (
+        "paper --out p --format pdf",
+        "no format is called 'pdf'; there are md, tex, html, csv and all",
+    ),
+    ("paper --out p --table mian", "no table is called 'mian'; there are main,"),
+    ("paper --out p --mark bold", "no mark is called 'bold'; there are tied, highest, none"),
+    ("paper --out p --run nowhere", "nowhere is not a run"),
+    ("report nowhere --lint", "nowhere is not a run"),
+    ("report a --ci wald", "no interval is called 'wald'; there are wilson, exact"),
+    ("report a b", "belongs to none of them; say where with --out"),
+    ("report a", "a is not a run: it has no run.json"),
+    ("report a --failures", "a is not a run: it has no run.json"),
+    ("report a b --audit", "are of one run"),
+    ("view .", "is not a run"),
+    ("collect a --out b", "two folders"),
+    ("submit verify .", "is a folder: a bundle is a .zip"),
+    ("submit no.zip", "no.zip"),
+    ("official assets", "`robospa official assets DIR --add`"),
+    ("check ws://127.0.0.1:9 --demo no.hdf5", "cannot be read as an HDF5 demonstration"),
+    ("eval localhost:8000 --out run", "of a server write ws://localhost:8000"),
+    ("eval http://localhost:8000 --out run", "no address of a policy server"),
+    ("eval hold --latency 0,100", "--out"),
+]
+REFUSED += [
+    (f"eval hold --out run --latency={given}", "no growing milliseconds")
+    for given in ("0", "200,100", "0,x", "-5,10", "0,0")
+]
+REFUSED += [
+    (" ".join(eval_words("run", *words.split())), said)
+    for words, said in [
+        ("ws://127.0.0.1:9", "127.0.0.1:9"),
+        ("nobody", "no policy 'nobody'"),
+        ("run_fakes:picky", "drives only-me, not aloha-agilex"),
+        ("hold --levels 6", "no level 6"),
+        ("hold --levels x", "neither a number nor a range"),
+        ("hold --tasks Pick_Block_Size", "did you mean Pick_Blocks_Size"),
+        ("hold --seeds nowhere.json", "neither a file nor a list"),
+        ("hold --trials 9", "has 4 seeds, not 9"),
+        ("hold --config no.toml", "no.toml: it cannot be read"),
+        ("hold --video some", "not one of none, failures, first, all"),
+        ("hold --split test", "not one of heldout, train"),
+        ("hold --world run_fakes:Broken", "robospa check"),
+        ("hold --embodiment nao", "no embodiment 'nao'; known are"),
+        ("hold --mode cleen", "did you mean clean?"),
+    ]
+]
+MISTYPED = [
+    ("submit .", "--model"),
+    ("check ws://127.0.0.1:9 --timeout -5", "-5 is not from 0.001 to 604800"),
+    ("tasks Pick_Block_Size", "did you mean Pick_Blocks_Size"),
+    ("tasks Pick_Blocks_Size --level 6", "has levels"),
+    ("tasks Pick_Blocks_Size --seed -1", "is not from 0 to"),
+    ("tasks Pick_Blocks_Size --split test", "there are train, heldout, indirect"),
+    ("tasks Pick_Blocks_Size --size 640", "is not WIDTHxHEIGHT"),
+    ("tasks Pick_Blocks_Size --size 640x9999", "is not between"),
+    ("tasks Pick_Blocks_Size --camera rear", "no camera"),
+    ("tasks Pick_Blocks_Size --world sapien", "no pictures are made of the world"),
+    ("tasks Pick_Blocks_Size --world official?speed=2", "--world official?speed=2"),
+    ("tasks Pick_Blocks_Size --world official --json", "leave out --json and --view"),
+    ("tasks Pick_Blocks_Size,Pick_Nothing --gallery --out sheet.jpg", "Pick_Nothing"),
+]
+
+
+@pytest.mark.parametrize(
+    ("code", "line", "said"),
+    [*((1, *row) for row in REFUSED), *((2, *row) for row in MISTYPED)],
+)
+def test_every_refusal_is_one_sentence_and_writes_nothing(
+    code: int, line: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("no.zip", "no.hdf5"):
+        (tmp_path / name).write_text("no")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("ROBOSPA_CACHE", str(tmp_path / "cache"))
+    monkeypatch.delenv("ROBOSPA_ASSETS", raising=False)
+    done = robospa(*line.split())
+    assert (done.code, done.out) == (code, "") and said in done.err
+    assert done.err.count("\n") == 1
+    assert {path.name for path in tmp_path.iterdir()} == {"no.zip", "no.hdf5"}
+
+
+def test_a_forgotten_token(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("ROBOSPA_TOKEN", raising=False)
+    with ServerThread(policy_factory=FakePolicy, token="a secret of theirs") as server:
+        done = robospa("eval", server.url, "--tasks", "Pick_Blocks_Size", "--out", tmp_path / "run")
+    assert "refused the token: missing or wrong token; give the server's token with" in done.err
+
+
+def test_a_port_that_is_taken() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        done = robospa("serve", "hold", "--port", port)
+    said = f"robospa: port {port} of 127.0.0.1 is in use: choose another --port"
+    assert done.code == 1 and done.err.startswith(said)
+
+
+def test_a_collection_names_its_extra_before_it_makes_anything(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def missing(module: str) -> None:
+        raise ModuleNotFoundError(f"No module named {module!r}", name=module)
+
+    monkeypatch.setattr(extras, "import_module", missing)
+    out = tmp_path / "data"
+    done = robospa("collect", "--tasks", "Pick_Blocks_Size", "--episodes", "1", "--out", out)
+    assert done.code == 1 and "pyarrow is not installed; install it with" in done.err
+    assert done.err.endswith("[demos]'\n") and not out.exists()
