@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from msgspec import to_builtins
 
-from robospa.results.records.manifest import trial_groups
-from robospa.results.records.runs import finished, read_file, read_records, to_line
+from robospa.results.records.manifest import RunManifest, trial_groups
+from robospa.results.records.runs import Run, finished, read_file, read_records, to_line
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.run import LoadedRun, load_run
+from robospa.schema import read
 from robospa.tasks.scene import SUITE
 from robospa.trial import TrialKey
 
@@ -120,6 +121,20 @@ KNOWN = [shown("Pick_Blocks_Size", 1, n, n < 3, candidates=2) for n in range(4)]
     shown("Press_Stapler_Repeat", 2, n, False, done=1, message=EVIL, instruction=EVIL)
     for n in range(2)
 ]
+
+
+def events(*rows: Sequence[Any]) -> tuple[dict[str, Any], ...]:
+    """Time, kind, object, index and note of each event, of which the last may be left out."""
+    names, usual = ("time", "kind", "object", "index", "note"), ("", -1, "")
+    return tuple(
+        {**dict(zip(names, (*row, *usual[len(row) - 2 :]), strict=True)), "step": 3} for row in rows
+    )
+
+
+def run_of(records: Iterable[TrialRecord], name: str = "run", **manifest: Any) -> Run:
+    """A run of these records that lies in no folder; `manifest` are entries of its run.json."""
+    found = {record.key: record for record in records}
+    return Run(Path(name), read(RunManifest, manifest, name), tuple(found), found)
 
 
 def manifest_data(keys: Sequence[TrialKey], **changes: Any) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from fake_runs import make_run, outcomes, record, shown, write
+from fake_runs import events, make_run, outcomes, record, write
 
 from robospa.results.comparison.compare import Difference, RunComparison, by_axis, compare_results
 from robospa.results.paper.columns import published_results
@@ -51,9 +51,8 @@ def test_averages_weigh_categories_the_same_and_say_how_they_were_made(tmp_path:
     assert group(found, "overall", 1).estimate.value == pytest.approx(0.25)
     assert group(found, "overall", 1).estimate.method == "MOVER on Tango"
     assert found.verdict.startswith("SR: ") and "on the same 6 trials" in found.verdict
-    again = compare_results(
-        side(tmp_path / "c", one), side(tmp_path / "d", two), method="bootstrap"
-    )
+    sides = side(tmp_path / "c", one), side(tmp_path / "d", two)
+    again = compare_results(*sides, method="bootstrap")
     assert group(again, "overall", 1).estimate.method == "stratified bootstrap"
     assert group(again, "overall", 1).p == group(found, "overall", 1).p  # not from a point
 
@@ -89,10 +88,9 @@ def test_onta_is_the_difference_of_rates_on_its_own_scale(tmp_path: Path) -> Non
 
 
 def test_first_choices_are_paired_like_successes(tmp_path: Path) -> None:
-    took = ({"time": 1.0, "kind": "wrong_object", "object": "other", "index": -1},)
-    one = [
-        replace(r, events=took) if r.key.seed < 2 else r for r in outcomes(SIZE, 1, [1, 1, 1, 0])
-    ]
+    took = events((1.0, "wrong_object", "other"))
+    one = outcomes(SIZE, 1, [1, 1], events=took)
+    one += [record(SIZE, 1, 2, 1), record(SIZE, 1, 3, 0)]
     sides = side(tmp_path / "a", one), side(tmp_path / "b", outcomes(SIZE, 1, [1, 0, 0, 0]))
     (cell,) = compare_results(*sides, "sr1").cells
     assert (cell.first, cell.second, cell.only_first, cell.only_second) == (0.25, 0.25, 1, 1)
@@ -144,32 +142,43 @@ def test_notes_tell_of_versions_and_of_policies_that_ignore_their_seed(tmp_path:
     assert "a ignores the policy seed" in notes
 
 
+ONE = record(SIZE, 1, 0, 1)
+
+
+def at(**key: str) -> TrialRecord:
+    """The same trial with another robot, mode or split."""
+    return replace(ONE, key=TrialKey(SIZE, 1, 0, **key))
+
+
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("first", "second", "metric", "message"),
     [
-        ({"embodiment": "piper"}, "a mixes the embodiments aloha-agilex and piper"),
-        ({"mode": "random"}, "a mixes the scene modes clean and random"),
-        ({"split": "train"}, "a mixes the instruction splits heldout and train"),
+        ([ONE, at(embodiment="piper")], [ONE], "sr", "a mixes the embodiments aloha-agilex and pi"),
+        ([ONE, at(mode="random")], [ONE], "sr", "a mixes the scene modes clean and random"),
+        ([ONE, at(split="train")], [ONE], "sr", "a mixes the instruction splits heldout and train"),
+        ([ONE], [at(embodiment="piper")], "sr", "a and b .* embodiments aloha-agilex and piper"),
+        ([ONE], [replace(ONE, scene_digest="x")], "sr", f"0 of {SIZE} L1 is another scene in b"),
+        ([ONE], [record(MUGS, 1, 0, 1)], "sr", "no variant in common"),
+        ([ONE], [replace(ONE, end="infrastructure")], "sr", "holds no result yet"),
+        ([ONE], [ONE, record(SIZE, 1, 1, 1, candidates=5)], "onta", "differ in their number of ca"),
     ],
 )
-def test_a_run_that_mixes_settings_is_refused(
-    tmp_path: Path, change: dict[str, str], message: str
+def test_sides_that_cannot_be_compared_are_refused(
+    tmp_path: Path, first: list[TrialRecord], second: list[TrialRecord], metric: str, message: str
 ) -> None:
-    one = record(SIZE, 1, 0, 1)
-    other = replace(one, key=replace(one.key, **change))  # type: ignore[arg-type]
-    mixed = side(tmp_path / "a", [one, other])
+    sides = side(tmp_path / "a", first), side(tmp_path / "b", second)
     with pytest.raises(IncomparableError, match=message):
-        compare_results(mixed, mixed)
+        compare_results(*sides, metric)
 
 
-def test_sides_of_different_embodiments_are_refused(tmp_path: Path) -> None:
-    one = record(SIZE, 1, 0, 1)
-    other = replace(one, key=TrialKey(SIZE, 1, 0, "piper"))
-    first, second = side(tmp_path / "a", [one]), side(tmp_path / "b", [other])
-    with pytest.raises(IncomparableError, match=r"a and b .* embodiments aloha-agilex and piper"):
-        compare_results(first, second)
+def test_what_cannot_be_held_against_the_paper(tmp_path: Path) -> None:
+    piper = side(tmp_path / "b", [at(embodiment="piper")])
     with pytest.raises(IncomparableError, match=r"b and RDT .* embodiments piper and aloha-agilex"):
-        compare_results(second, published_results("RDT"))
+        compare_results(piper, published_results("RDT"))
+    with pytest.raises(ValueError, match="no published model is called 'pi9'; there are RDT"):
+        published_results("pi9")
+    with pytest.raises(IncomparableError, match="without the trials"):
+        compare_results(published_results("RDT"), published_results("GO-1"), "ps")
 
 
 def test_other_step_limits_are_refused_but_not_against_the_paper(tmp_path: Path) -> None:
@@ -181,36 +190,9 @@ def test_other_step_limits_are_refused_but_not_against_the_paper(tmp_path: Path)
     assert compare_results(tripled, published_results("X-VLA")).cells
 
 
-def test_other_scenes_under_one_seed_are_refused(tmp_path: Path) -> None:
-    one = record(SIZE, 1, 0, 1)
-    first = side(tmp_path / "a", [one])
-    second = side(tmp_path / "b", [replace(one, scene_digest="changed")])
-    with pytest.raises(
-        IncomparableError, match="seed 0 of Pick_Blocks_Size L1 is another scene in b"
-    ):
-        compare_results(first, second)
-
-
-def test_what_cannot_be_compared_is_one_sentence(tmp_path: Path) -> None:
-    first = side(tmp_path / "a", outcomes(SIZE, 1, [1]))
-    second = side(tmp_path / "b", outcomes(MUGS, 1, [1]))
-    with pytest.raises(IncomparableError, match="no variant in common"):
-        compare_results(first, second)
-    empty = side(tmp_path / "c", [record(SIZE, 1, 0, 0, end="infrastructure")])
-    with pytest.raises(IncomparableError, match="holds no result yet"):
-        compare_results(first, empty)
-    with pytest.raises(ValueError, match="no published model is called 'pi9'; there are RDT"):
-        published_results("pi9")
-    with pytest.raises(IncomparableError, match="without the trials"):
-        compare_results(published_results("RDT"), published_results("GO-1"), "ps")
-    mixed = side(tmp_path / "d", [record(SIZE, 1, 0, 1), record(SIZE, 1, 1, 1, candidates=5)])
-    with pytest.raises(IncomparableError, match="differ in their number of candidates"):
-        compare_results(first, mixed, "onta")
-
-
-def trials(mode: str, good: int, split: str = "heldout") -> list:  # type: ignore[type-arg]
-    made = [shown("Pick_Blocks_Size", 1, n, n < good) for n in range(8)]
-    return [replace(r, key=replace(r.key, mode=mode, split=split)) for r in made]
+def trials(mode: str, good: int) -> list[TrialRecord]:
+    made = outcomes(SIZE, 1, [1] * good + [0] * (8 - good))
+    return [replace(r, key=replace(r.key, mode=mode)) for r in made]
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +24,6 @@ from robospa.results.comparison.sample_size import (
 )
 from robospa.results.figures.charts import draw_latency_curves
 from robospa.results.figures.series import styled
-from robospa.results.records.runs import read_run
 from robospa.results.scoring.models import IncomparableError, ModelResults, results_of_run
 
 TRIALS = 40
@@ -34,20 +32,13 @@ TRIALS = 40
 def at(folder: Path, latency: float, good: int, switching: str = "wait") -> ModelResults:
     """A run of TRIALS trials at a latency, of which the first `good` succeed."""
     seen = {"periods": 100, "held": 20, "blind": 5, "seam_jerk": 300.0, "other_jerk": 50.0}
+    size, ends = "Pick_Blocks_Size", ["success"] * good + ["time_limit"] * (TRIALS - good)
     records = [
-        replace(
-            shown("Pick_Blocks_Size", 1, n, n < good),
-            diagnostics={"real_time": seen},
-            end="success" if n < good else "time_limit",
-        )
-        for n in range(TRIALS)
+        shown(size, 1, n, n < good, diagnostics={"real_time": seen}, end=end)
+        for n, end in enumerate(ends)
     ]
-    make_run(folder, records)
-    manifest = json.loads((folder / "run.json").read_text())
     clock = {"latency": f"{latency:g}ms", "latency_ms": latency, "switching": switching}
-    manifest["settings"]["clock"] = clock
-    (folder / "run.json").write_text(json.dumps(manifest))
-    return results_of_run(read_run(folder))
+    return results_of_run(make_run(folder, records, settings={"clock": clock}))
 
 
 @pytest.fixture

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fake_runs import record, write
+from fake_runs import events, record, run_of, write
 
 from robospa.harness.running.films import unfilmed
 from robospa.results.comparison.profile import flipped, profile_of
 from robospa.results.figures.draw import draw_profile
-from robospa.results.records.manifest import RunError, RunManifest
+from robospa.results.records.manifest import RunError
 from robospa.results.records.runs import Run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.report.page import write_report
@@ -29,14 +29,10 @@ AXES = (
 
 def trial(axis: str, seed: int, took: str | None, done: bool, target: str) -> TrialRecord:
     """A trial in which one of `THINGS` was taken, perhaps as asked."""
-    success = done and took == target
-    events = ({"time": 1.0, "kind": "grasped", "object": took or "", "index": -1},)
-    made = record(
-        SIZE, 4, seed, int(success), events=events if took else (), candidates=THINGS,
-        diagnostics={"roles": {f"object_{n}": [0] if f"object_{n}" == target else []
-                               for n in range(THINGS)}},
-        timing={"processor": 0.5},
-    )  # fmt: skip
+    roles = {name: [0] * (name == target) for name in map("object_{}".format, range(THINGS))}
+    more = {"candidates": THINGS, "diagnostics": {"roles": roles}, "timing": {"processor": 0.5}}
+    grasped = events((1.0, "grasped", took)) if took else ()
+    made = record(SIZE, 4, seed, int(done and took == target), events=grasped, **more)
     mode = "clean" if axis == "clean" else f"randomized:{axis}"
     return replace(made, key=replace(made.key, mode=mode))
 
@@ -71,7 +67,7 @@ def shaky(axis: str, target: str, rng: np.random.Generator) -> tuple[str | None,
     return reads(axis, target, rng)[0], 0.3 if axis == "action-noise=10" else 0.8
 
 
-def run_of(policy: Policy, seed: int, trials: int = 50) -> Run:
+def simulated(policy: Policy, seed: int, trials: int = 50) -> Run:
     rng = np.random.default_rng(seed)
     records = []
     for axis in ("clean", *AXES):
@@ -79,8 +75,7 @@ def run_of(policy: Policy, seed: int, trials: int = 50) -> Run:
         for n in range(trials):
             took, chance = policy(axis, target, rng)
             records.append(trial(axis, n, took, rng.random() < chance, target))
-    keys = tuple(r.key for r in records)
-    return Run(Path("simulated"), RunManifest(), keys, {r.key: r for r in records})
+    return run_of(records)
 
 
 @pytest.mark.parametrize(
@@ -98,7 +93,7 @@ def test_each_weakness_is_found_and_no_other(policy: Policy, guilty: set[str]) -
     """Of 50 trials an axis; of 200 such tables of each policy 6 at most had a false alarm."""
     alarms = caught = 0
     for seed in range(16):
-        found = {c.axis for c in profile_of(run_of(policy, seed)).costs if c.found}
+        found = {c.axis for c in profile_of(simulated(policy, seed)).costs if c.found}
         alarms += bool(found - guilty)
         caught += guilty <= found
     assert alarms <= 2, alarms
@@ -109,7 +104,7 @@ def test_reading_is_told_from_not_reading() -> None:
     def rows(policy: Policy) -> dict[str, tuple[float | None, float | None, float]]:
         return {
             r.axis: (r.asked and r.asked.low, r.before and r.before.low, r.taken.value)
-            for r in profile_of(run_of(policy, 1)).readings
+            for r in profile_of(simulated(policy, 1)).readings
         }
 
     reader, deaf, parrot = rows(reads), rows(blind_to_words), rows(one_sentence)

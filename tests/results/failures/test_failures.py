@@ -1,10 +1,11 @@
 """Failure types from events written by hand: one rule a test."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import pytest
-from fake_runs import trial_record
+from fake_runs import events, trial_record
 
 from robospa.results.failures.labels import counts_table, distribution, label
 from robospa.results.records.trial_record import TrialRecord
@@ -17,24 +18,11 @@ TOWER = {"a": [0], "b": [1], "c": [2]}
 CLICKS = {"can": [0, 2], "bread": [1], "basket": []}
 
 
-def events(rows: Sequence[Row]) -> tuple[Mapping[str, Any], ...]:
-    """(time, kind, object, index, note) with defaults, as records hold them."""
-    found = []
-    for row in rows:
-        time, kind, name, index, note = (*row, *("", -1, "")[len(row) - 2 :])
-        found.append(
-            {"time": time, "kind": kind, "object": name, "index": index, "note": note, "step": 3}
-        )
-    return tuple(found)
-
-
 def failed(
     category: str,
     rows: Sequence[Row],
-    roles: Mapping[str, list[int]] | None = PICK,
+    roles: Mapping[str, list[int]] = PICK,
     end: str = "step_limit",
-    video: str = "",
-    done: int = 0,
     seed: int = 1,
 ) -> TrialRecord:
     """A failed trial of a category with these events."""
@@ -42,16 +30,9 @@ def failed(
         TrialKey(f"Task_{category}", 3, seed),
         category=category,
         end=end,
-        done=done,
-        best=done,
         total=3,
-        candidates=3,
-        steps=100,
-        physics_steps=5000,
-        policy_calls=10,
-        events=events(rows),
-        diagnostics={} if roles is None else {"roles": roles},
-        video=video,
+        events=events(*rows),
+        diagnostics={"roles": roles},
     )
 
 
@@ -199,7 +180,7 @@ def test_closing_for_a_press_is_no_failed_grasp() -> None:
     record = failed("CAC", rows, CLICKS)
     assert kind(record) == "manipulation"
     told = {**record.diagnostics, "pressed": ["can"]}
-    assert kind(TrialRecord(**{**vars(record), "diagnostics": told})) == "redundant_repetition"
+    assert kind(replace(record, diagnostics=told)) == "redundant_repetition"
 
 
 # -- counts ------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from fake_runs import trial_record
+from fake_runs import record
 
 from robospa.results.failures.labels import KINDS, distribution
 from robospa.results.figures.charts import (
@@ -21,7 +21,6 @@ from robospa.results.figures.charts import (
 from robospa.results.figures.draw import draw
 from robospa.results.figures.series import FORMATS, GRID, INK, Series, label_of, styled
 from robospa.results.paper.columns import published_column
-from robospa.results.records.trial_record import TrialRecord
 from robospa.results.report.page import inline_svg
 from robospa.results.scoring.scores import score
 from robospa.trial import TrialKey
@@ -34,23 +33,13 @@ def published(model: str) -> Series:
     return Series(model, published_column(model).scores, published=True)
 
 
-def trial(task: str, category: str, level: int, seed: int, success: bool) -> TrialRecord:
-    return trial_record(
-        TrialKey(task, level, seed),
-        success,
-        category=category,
-        done=level if success else level - 1,
-        best=level,
-        total=level,
-        candidates=3,
-        latency={"p50": 4.0 + seed, "p95": 6.0, "p99": 9.0, "max": 9.0},
-    )
+LATE = {"p95": 6.0, "p99": 9.0, "max": 9.0}
 
 
 def small_run(name: str = "mine") -> Series:
     records = [
-        trial(task, category, level, seed, seed > level)
-        for task, category in (("Pick_Blocks_Size", "GAC"), ("Press_Stapler_Repeat", "RPF"))
+        record(task, level, seed, level - (seed <= level), level, latency={"p50": 4 + seed, **LATE})
+        for task in ("Pick_Blocks_Size", "Press_Stapler_Repeat")
         for level in (1, 5)
         for seed in range(4)
     ]

@@ -4,11 +4,10 @@ import csv
 import io
 from collections import Counter
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
-from fake_runs import trial_record
+from fake_runs import outcomes, record, run_of
 
 from robospa.results.comparison.compare import compare_results
 from robospa.results.paper import published, rounding
@@ -25,14 +24,12 @@ from robospa.results.paper.origin import (
 )
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.paper.tables import make_tables
-from robospa.results.records.manifest import RunManifest
 from robospa.results.records.runs import Run
 from robospa.results.report.report import make_report
 from robospa.results.scoring.models import IncomparableError
 from robospa.results.tables import Table, to_csv
-from robospa.schema import read
 from robospa.tasks.scene import SUITE as OURS
-from robospa.trial import CATEGORIES, CATEGORY_NAMES, TrialKey
+from robospa.trial import CATEGORIES, CATEGORY_NAMES
 
 DATA = load()
 
@@ -275,15 +272,10 @@ def run_in(world: str, name: str = "mine", successes: int = 3) -> Run:
     """Four trials of two variants: `successes` of Pick_Blocks_Size L1, none of the other, of which
     RDT has 3 % as printed."""
     suite, settings = WORLDS[world]
-    keys = [TrialKey("Pick_Blocks_Size", 1, n) for n in range(4)]
-    records = [trial_record(k, n < successes, candidates=2) for n, k in enumerate(keys)]
-    others = [TrialKey("Press_Stapler_Repeat", 2, n) for n in range(4)]
-    records += [trial_record(k, category="RPF", total=2) for k in others]
+    records = outcomes("Pick_Blocks_Size", 1, [1] * successes + [0] * (4 - successes))
+    records += [record("Press_Stapler_Repeat", 2, n, 0, 2) for n in range(4)]
     said: dict[str, Any] = {"policy": {"spec": {"name": name}}, "privileged": False, **settings}
-    manifest = {"settings": said, "suite": suite}
-    return Run(
-        Path(name), read(RunManifest, manifest, "it"), (*keys, *others), {r.key: r for r in records}
-    )
+    return run_of(records, name, settings=said, suite=suite)
 
 
 def column_in(world: str, name: str = "mine", successes: int = 3) -> Column:

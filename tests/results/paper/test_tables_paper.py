@@ -7,14 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fake_runs import outcomes, trial_record, write
-from msgspec import structs
+from fake_runs import outcomes, run_of, trial_record, write
 
 from robospa.results.paper.columns import published_column, run_column
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.paper.result_tables import summary_table, task_table
 from robospa.results.paper.tables import make_tables
-from robospa.results.records.manifest import RunManifest
 from robospa.results.records.runs import Run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.report.report import report_tables
@@ -22,29 +20,15 @@ from robospa.results.report.run_card import rows
 from robospa.results.scoring.models import IncomparableError
 from robospa.results.scoring.scores import score_run, to_json
 from robospa.results.tables import Table, TableCell
-from robospa.schema import read
 from robospa.trial import TrialKey
 
 DATA = load()
 
 
-def record(key: TrialKey, success: bool, done: int, total: int, candidates: int) -> TrialRecord:
-    return trial_record(
-        key,
-        success,
-        category=DATA.tasks[key.task].category if key.task in DATA.tasks else "",
-        done=done,
-        best=done,
-        total=total,
-        candidates=candidates,
-    )
-
-
-def make_run(records: Sequence[TrialRecord], name: str = "mine", **manifest: Any) -> Run:
-    settings = {"policy": {"spec": {"name": name}}, "privileged": False}
-    keys = tuple(r.key for r in records)
-    content = {"settings": settings, "suite": "robospa-1", **manifest}
-    return Run(Path("run"), read(RunManifest, content, "it"), keys, {r.key: r for r in records})
+def make_run(
+    records: Sequence[TrialRecord], name: str = "mine", suite: str = "robospa-1", **settings: Any
+) -> Run:
+    return run_of(records, suite=suite, settings={"policy": {"spec": {"name": name}}, **settings})
 
 
 @cache
@@ -60,13 +44,14 @@ def full_run(model: str, trials: int = 100, **key: Any) -> tuple[TrialRecord, ..
             for n in range(trials):
                 done = min(count, left) if ps is not None else int(n < sr)
                 left -= done
+                spatial = {"total": 1, "candidates": count}
                 made.append(
-                    record(
+                    trial_record(
                         TrialKey(task.name, level, n, **key),
                         100 * n < sr * trials,
-                        done,
-                        count if ps is not None else 1,
-                        0 if ps is not None else count,
+                        category=task.category,
+                        done=done,
+                        **(spatial if ps is None else {"total": count, "candidates": 0}),
                     )
                 )
     return tuple(made)
@@ -187,7 +172,7 @@ def test_other_suites_scenes_or_splits_are_refused() -> None:
 @pytest.mark.parametrize("key", [TrialKey("Juggle", 1, 0), TrialKey("Pick_Blocks_Size", 6, 0)])
 def test_unknown_variants_are_named(key: TrialKey) -> None:
     with pytest.raises(IncomparableError, match=f"{key.task} L{key.level}"):
-        run_column(make_run([record(key, True, 1, 1, 2)]))
+        run_column(make_run([trial_record(key, True)]))
 
 
 def test_other_mistakes_are_named() -> None:
@@ -206,9 +191,7 @@ def test_other_mistakes_are_named() -> None:
 
 
 def test_a_privileged_policy_is_called_so() -> None:
-    run = make_run(full_run("RDT", trials=1))
-    settings = structs.replace(run.manifest.settings, privileged=True)
-    oracle = run_column(replace(run, manifest=structs.replace(run.manifest, settings=settings)))
+    oracle = run_column(make_run(full_run("RDT", trials=1), privileged=True))
     assert oracle.title == "mine (privileged)"
     columns = [published_column("RDT"), oracle, published_column("X-VLA")]
     (table,) = make_tables(columns, ["sr-tasks"], mark="highest")
@@ -256,14 +239,14 @@ def grounding(sets: int = SETS) -> list[TrialRecord]:
     return found
 
 
-def run_of(folder: Path, records: list[TrialRecord]) -> Run:
+def written(folder: Path, records: list[TrialRecord]) -> Run:
     return write(folder, records, categories={r.key.task: r.category for r in records})
 
 
 @pytest.fixture
 def mixed(tmp_path: Path) -> Run:
     """Every basic trial fails or not; the one base task always succeeds."""
-    return run_of(tmp_path / "run", outcomes("Pick_Blocks_Size", 1, [1] * 4) + grounding())
+    return written(tmp_path / "run", outcomes("Pick_Blocks_Size", 1, [1] * 4) + grounding())
 
 
 def test_no_average_includes_them(mixed: Run) -> None:
@@ -283,7 +266,7 @@ def test_their_rows_come_last(mixed: Run) -> None:
 
 
 def test_a_run_of_them_alone_has_no_overall_value(tmp_path: Path) -> None:
-    scores = score_run(run_of(tmp_path / "run", grounding()))
+    scores = score_run(written(tmp_path / "run", grounding()))
     assert to_json(scores)["overall"] == {}
     assert [label for _, label in rows(scores)][-1] == "CBG Color-Based Grounding"
 
@@ -300,18 +283,18 @@ def test_the_table_sets_own_runs_beside_the_printed_values(mixed: Run) -> None:
 
 
 def test_a_mean_over_some_of_the_sets_stays_open(tmp_path: Path) -> None:
-    column = run_column(run_of(tmp_path / "run", grounding(sets=4)))
+    column = run_column(written(tmp_path / "run", grounding(sets=4)))
     (table,) = make_tables([column], ["basic"])
     assert {e.text for e in table.rows[0].cells[5:]} == {"–"}
 
 
 def test_runs_of_them_alone_are_in_no_table_of_the_benchmark(tmp_path: Path) -> None:
-    column = run_column(run_of(tmp_path / "run", grounding()))
+    column = run_column(written(tmp_path / "run", grounding()))
     main, basic = make_tables([published_column("pi0.5"), column], ["main", "basic"])
     assert len(main.groups) == 1 and len(basic.groups) == 2
 
 
 def test_the_report_shows_the_table(mixed: Run, tmp_path: Path) -> None:
     assert "basic" in [s.table.name for s in report_tables([run_column(mixed)])]
-    alone = run_column(run_of(tmp_path / "alone", grounding()))
+    alone = run_column(written(tmp_path / "alone", grounding()))
     assert [s.table.name for s in report_tables([alone])] == ["basic"]

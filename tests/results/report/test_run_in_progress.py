@@ -3,7 +3,8 @@
 import json
 import re
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -46,11 +47,8 @@ def card_of(page: str) -> str:
 
 
 def page_of(folder: Path) -> str:
-    live = LiveReport(folder)
-    try:
+    with closing(LiveReport(folder)) as live:
         return live.read()[0].decode()
-    finally:
-        live.close()
 
 
 def test_a_run_is_in_progress_while_its_lock_is_held(folder: Path, going: ExitStack) -> None:
@@ -72,7 +70,7 @@ def test_trials_that_are_still_to_run_are_not_missing(folder: Path, going: ExitS
 
 
 def test_lost_trials_of_a_run_in_progress_are_missing(folder: Path) -> None:
-    lost = KNOWN[4].__class__(**{**vars(KNOWN[4]), "end": "infrastructure"})
+    lost = replace(KNOWN[4], end="infrastructure")
     with (folder / "trials" / "0000.jsonl").open("a") as file:
         file.write(to_line(lost))
     run = read_run(folder)
@@ -94,10 +92,8 @@ def test_the_live_page_shows_the_rate_so_far_with_its_interval(folder: Path) -> 
 
 
 def test_averages_of_a_live_page_are_over_what_has_finished(folder: Path) -> None:
-    (table,) = [
-        shown.table for shown in make_report(read_run(folder)).tables if shown.table.name == "main"
-    ]
-    rows = {line.label: [e.text for e in line.cells] for line in table.rows if line.cells}
+    tables = {shown.table.name: shown.table for shown in make_report(read_run(folder)).tables}
+    rows = {row.label: [e.text for e in row.cells] for row in tables["main"].rows if row.cells}
     assert rows["Geometric Attribute Cognition"] == rows["Overall average"] == ["75.0"]
 
 

@@ -5,9 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fake_runs import make_run, record, trial_record
+from fake_runs import make_run, record, run_of, trial_record
 
-from robospa.results.records.manifest import RunManifest
 from robospa.results.records.runs import Run, from_line, to_line
 from robospa.results.records.trial_record import RetryRow, TrialRecord, query_entries
 from robospa.results.report.page import write_report
@@ -150,9 +149,7 @@ def key(seed: int, level: int = 1) -> TrialKey:
 
 
 def made(*records: TrialRecord) -> Run:
-    return Run(
-        Path("run"), RunManifest(), tuple(r.key for r in records), {r.key: r for r in records}
-    )
+    return run_of(records)
 
 
 def test_retries_survive_the_file_and_old_lines_have_none() -> None:

@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from fake_runs import trial_record
+from fake_runs import events, trial_record
 
 from robospa.results.scoring.first_choice import first_choice
 from robospa.trial import TrialKey
@@ -25,15 +25,13 @@ def chosen(
     success: bool = True,
     **diagnostics: object,
 ) -> bool:
-    names = ("time", "kind", "object", "index", "note")
-    events = tuple(dict(zip(names, row, strict=False)) for row in rows)
     return first_choice(
         trial_record(
             TrialKey(task, 3, 1),
             category=category,
             success=success,
             total=3,
-            events=events,
+            events=events(*rows),
             diagnostics={"roles": roles, **diagnostics},
         )
     )

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from fake_runs import outcomes, record, trial_record, write
+from fake_runs import outcomes, record, write
 
 from robospa.results.comparison.compare import compare_results
 from robospa.results.records.runs import Run
@@ -18,22 +18,6 @@ from robospa.results.scoring.models import results_of_run
 from robospa.results.scoring.scores import IDLE, Scores, score, score_run
 from robospa.results.statistics.intervals import wilson
 from robospa.trial import TrialKey
-
-BASE = trial_record(TrialKey("A", 1, 0))
-
-
-def trial(task: str, category: str, seed: int, done: int, total: int = 1) -> TrialRecord:
-    success = done == total
-    return replace(
-        BASE,
-        key=TrialKey(task, 1, seed),
-        category=category,
-        success=success,
-        end="success" if success else "step_limit",
-        done=done,
-        best=done,
-        total=total,
-    )
 
 
 def scores(records: list[TrialRecord], extra: tuple[TrialKey, ...] = ()) -> Scores:
@@ -47,11 +31,10 @@ def values(found: object, metric: str) -> float | None:
 
 
 def test_the_first_choice_counts_beside_the_official_rule() -> None:
-    records = [trial("A", "GAC", n, int(n < 3)) for n in range(4)]
+    records = outcomes("A", 1, [1, 1, 1, 0])
     took = {"time": 1.0, "kind": "wrong_object", "object": "other", "index": -1}
     records[0] = replace(records[0], events=(took,))
-    lost = replace(trial("A", "GAC", 9, 0), end="infrastructure")
-    cell = scores([*records, lost]).cells["A", 1]
+    cell = scores([*records, lost("A", 9)]).cells["A", 1]
     assert (cell.successes, cell.firsts) == (3, 2)
     assert [values(cell, m) for m in ("sr", "sr1", "onta", "onta1")] == [0.75, 0.5, 0.5, 0.0]
     assert "ps" not in cell.values
@@ -60,7 +43,7 @@ def test_the_first_choice_counts_beside_the_official_rule() -> None:
 
 
 def test_progress_is_the_mean_share_of_subtasks_done_at_the_end() -> None:
-    records = [trial("B", "OFE", n, done, total=4) for n, done in enumerate((0, 1, 4, 3))]
+    records = [record("B", 1, n, k, 4, category="OFE") for n, k in enumerate((0, 1, 4, 3))]
     given = tuple({"time": t, "kind": "subtask_done", "object": "a", "index": t} for t in range(3))
     records[3] = replace(records[3], events=given)  # one subtask held before the first action
     cell = scores(records).cells["B", 1]
@@ -69,15 +52,15 @@ def test_progress_is_the_mean_share_of_subtasks_done_at_the_end() -> None:
 
 
 def test_the_overall_value_is_the_mean_of_categories_not_of_tasks() -> None:
-    records = [trial(f"A{n}", "GAC", 0, 1) for n in range(3)] + [trial("B", "SDE", 0, 0)]
-    found = scores(records)
+    records = [record(f"A{n}", 1, 0, 1) for n in range(3)]
+    found = scores([*records, record("B", 1, 0, 0, category="SDE")])
     assert values(found.overall[1], "sr") == pytest.approx(0.5)
     assert values(found.dimensions["spatial", 1], "sr") == pytest.approx(0.5)
     assert ("procedural", 1) not in found.dimensions
 
 
 def test_a_variant_without_a_result_leaves_the_averages_open() -> None:
-    found = scores([trial("A", "GAC", 0, 1)], extra=(TrialKey("Z", 1, 0),))
+    found = scores([record("A", 1, 0, 1)], extra=(TrialKey("Z", 1, 0),))
     assert found.cells["Z", 1].values == dict.fromkeys(("sr", "sr1", "onta", "onta1"))
     assert values(found.categories["GAC", 1], "sr") is None
     assert values(found.overall[1], "onta") is None
@@ -91,14 +74,14 @@ PICK, PUT = "Pick_Blocks_Size", "Put_Bottles_Dustbin"
 WHY = "ws://gpu:8000 did not send actions within 120 s"
 
 
-def lost(task: str, level: int, seed: int, why: str = WHY) -> TrialRecord:
-    return replace(record(task, level, seed, 0), end="infrastructure", message=why, attempts=3)
+def lost(task: str, seed: int) -> TrialRecord:
+    return record(task, 1, seed, 0, end="infrastructure", message=WHY, attempts=3)
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     """Of 8 listed trials of a spatial variant 6 have a result, of 8 of a procedural one 6."""
-    records = [*outcomes(PICK, 1, [1, 1, 1, 0, 1, 1]), lost(PICK, 1, 6), lost(PICK, 1, 7)]
+    records = [*outcomes(PICK, 1, [1, 1, 1, 0, 1, 1]), lost(PICK, 6), lost(PICK, 7)]
     records += [record(PUT, 1, seed, 1 + seed % 2, 2) for seed in range(6)]
     never = [TrialKey(PUT, 1, 6), TrialKey(PUT, 1, 7)]
     return write(tmp_path_factory.mktemp("missing") / "run", records, never)

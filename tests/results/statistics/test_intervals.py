@@ -64,11 +64,6 @@ def test_wilson_holds_its_value_and_is_symmetric(trials: int, data: st.DataObjec
     assert found.low == pytest.approx(1 - mirrored.high)
 
 
-def test_no_trials_have_no_rate() -> None:
-    with pytest.raises(ValueError, match="0 successes in 0 trials"):
-        wilson(0, 0)
-
-
 def test_mover_by_hand() -> None:
     parts = [Estimate(0.5, 0.2, 0.9), Estimate(0.1, 0.1, 0.4)]
     found = mover(parts, [0.5, 0.5])
@@ -118,11 +113,6 @@ def test_limits_of_a_paired_difference_are_where_the_score_reaches_two(
         assert abs(score) == pytest.approx(1.96, abs=0.005)
 
 
-def test_impossible_pairs_are_refused() -> None:
-    with pytest.raises(ValueError, match="3 and 3 discordant of 4 pairs cannot be"):
-        paired_difference(3, 3, 4)
-
-
 def test_pairs_of_progress() -> None:
     differs = Sample((5, 10, 60, 20, 5), 0.5, -1.0)
     found = paired_sample_difference(differs)
@@ -133,8 +123,6 @@ def test_pairs_of_progress() -> None:
     assert equal.high == pytest.approx(paired_difference(0, 0, 100).high)
     shifted = paired_sample_difference(Sample((0, 0, 0, 100, 0), 0.5, -1.0))
     assert shifted.low < shifted.value == 0.5 < shifted.high
-    with pytest.raises(ValueError, match="as far below zero as above"):
-        paired_sample_difference(Sample((1, 1, 1), 1.0, 0.0))
 
 
 def test_every_method_says_what_it_did() -> None:
@@ -145,11 +133,6 @@ def test_every_method_says_what_it_did() -> None:
     assert several == ["MOVER on Wilson", "MOVER on exact", "stratified bootstrap"]
     assert mean([mean([wilson(1, 10)] * 2), wilson(3, 10)]).method == "MOVER on Wilson"
     assert over_tasks([cells]).method == "bootstrap over tasks"
-
-
-def test_an_unknown_method_names_those_there_are() -> None:
-    with pytest.raises(ValueError, match="'wald'; there are wilson, exact, bootstrap"):
-        interval_of([rate(1, 2)], method="wald")
 
 
 def test_an_average_is_one_call_over_its_cells_or_means_of_means() -> None:
@@ -186,8 +169,6 @@ def test_over_tasks_is_never_narrower_than_over_seeds() -> None:
     same = over_tasks(spread, against=spread)
     assert same.value == 0.0
     assert same.low < 0 < same.high
-    with pytest.raises(ValueError, match="the same tasks on both sides"):
-        over_tasks(spread, against=spread[:1])
 
 
 TRIALS = 100
@@ -366,9 +347,18 @@ def test_progress_counts_subtasks() -> None:
         (lambda: Sample((1, 1), -1.0), "not positive"),
         (lambda: draw([], []), "one weight for each of at least one sample"),
         (lambda: draw_over_tasks([[]]), "at least one task in every category"),
+        (lambda: wilson(0, 0), "0 successes in 0 trials"),
+        (lambda: interval_of([rate(1, 2)], method="wald"), "'wald'; there are wilson, exact, boot"),
+        (lambda: over_tasks([[rate(1, 2)]], against=[[]] * 2), "the same tasks on both sides"),
+        (lambda: paired_difference(3, 3, 4), "3 and 3 discordant of 4 pairs cannot be"),
+        (lambda: paired_sample_difference(Sample((1, 1, 1))), "as far below zero as above"),
+        (lambda: mcnemar_mid_p(-1, 2), "no counts"),
+        (lambda: boschloo(Sample((1, 1, 1)), rate(1, 3)), "progress has none"),
+        (lambda: boschloo(rate(1, 5000), rate(2, 5000)), "5000 trials takes too long"),
+        (lambda: p_of_interval(Estimate(1.0, 1.0, 2.0)), "without width"),
     ],
 )
-def test_what_is_no_sample_is_refused(make: object, message: str) -> None:
+def test_what_cannot_be_is_refused(make: object, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         make()  # type: ignore[operator]
 
@@ -382,8 +372,6 @@ def test_mcnemar_by_hand() -> None:
     assert mcnemar_mid_p(0, 0) == mcnemar_mid_p(4, 4) == 1.0
     assert mcnemar_mid_p(3, 9) == mcnemar_mid_p(9, 3)
     assert mcnemar_mid_p(0, 40) == pytest.approx(2.0**-40, rel=1e-9)
-    with pytest.raises(ValueError, match="no counts"):
-        mcnemar_mid_p(-1, 2)
 
 
 @pytest.mark.parametrize(
@@ -397,19 +385,10 @@ def test_boschloo_agrees_with_scipy(table: tuple[int, int, int, int]) -> None:
     assert boschloo(rate(a, n), rate(b, m)) == pytest.approx(expected, abs=1e-5)
 
 
-def test_boschloo_refuses_progress_and_thousands_of_trials() -> None:
-    with pytest.raises(ValueError, match="progress has none"):
-        boschloo(Sample((1, 1, 1)), rate(1, 3))
-    with pytest.raises(ValueError, match="5000 trials takes too long"):
-        boschloo(rate(1, 5000), rate(2, 5000))
-
-
 def test_p_of_an_interval_by_hand() -> None:
     assert p_of_interval(Estimate(1.0, 0.0, 2.0)) == pytest.approx(0.05)
     assert p_of_interval(Estimate(-2.0, -3.0, -1.0)) == pytest.approx(0.0000887, abs=1e-6)
     assert p_of_interval(Estimate(0.0, 0.0, 0.0)) == 1.0
-    with pytest.raises(ValueError, match="without width"):
-        p_of_interval(Estimate(1.0, 1.0, 2.0))
 
 
 def test_p_of_an_interval_is_small_exactly_if_zero_is_outside() -> None:
