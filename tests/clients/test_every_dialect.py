@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from run_fakes import FakePolicy
 from standins import DIALECTS, QUICK, TRIAL, answered, joint_chunk, observation, talking
 
 from robospa.clients import connect, dialect
@@ -22,7 +23,6 @@ from robospa.protocol.errors import (
     ServerError,
     TransportError,
 )
-from robospa.protocol.policy import PolicySpec
 from robospa.protocol.server import ServerThread
 from robospa.protocol.transport import Timeouts
 
@@ -228,20 +228,10 @@ def test_an_http_server_of_another_kind() -> None:
         thread.join(5)
 
 
-class Zeros:
-    spec = PolicySpec("zeros", cameras=(), state="none")
-
-    def reset(self, trial: Any) -> None:
-        return None
-
-    def infer(self, seen: Any) -> Any:
-        return np.zeros((1, 14), np.float32)
-
-
 @pytest.mark.parametrize("scheme", ["ws", "openpi"])
 def test_a_full_server_is_not_another_dialect(scheme: str) -> None:
     """It is tried again: a worker that reconnects may be faster than the end of its old one."""
-    with ServerThread(Zeros(), options=ServerOptions(patience=0.05)) as server:
+    with ServerThread(FakePolicy(), options=ServerOptions(patience=0.05)) as server:
         url = server.url.replace("ws://", f"{scheme}://")
         with connect(server.url, timeouts=QUICK) as first:
             first.reset(TRIAL)
@@ -250,7 +240,7 @@ def test_a_full_server_is_not_another_dialect(scheme: str) -> None:
 
 
 def test_our_own_server_is_recognised() -> None:
-    with ServerThread(policy_factory=Zeros) as server:
+    with ServerThread(policy_factory=FakePolicy) as server:
         port = server.url.rpartition(":")[2]
         for scheme in ("go1+http", "xvla+http", "xpolicylab", "vla-eval", "robotwin+tcp"):
             with pytest.raises(HandshakeError, match=r"a robospa\.v1 server; try ws://127"):

@@ -156,11 +156,14 @@ def embeddings(folder: Path, torch: Any) -> Path:
     return folder
 
 
+def rdt_of(torch: Any, folder: Path, **given: Any) -> rdt.Rdt:
+    texts = Embeddings(embeddings(folder / "e", torch), None, "cpu", np.float32, 1024)
+    return rdt.Rdt(OfficialRdt(torch), texts, rdt.RdtServerOptions(checkpoint="x", **given))
+
+
 @pytest.fixture
 def served_rdt(torch: Any, tmp_path: Path) -> rdt.Rdt:
-    options = rdt.RdtServerOptions(checkpoint="x")
-    texts = Embeddings(embeddings(tmp_path / "e", torch), None, "cpu", np.float32, 1024)
-    return rdt.Rdt(OfficialRdt(torch), texts, options)
+    return rdt_of(torch, tmp_path)
 
 
 def test_pictures_come_as_head_right_left_before_and_now(served_rdt: rdt.Rdt) -> None:
@@ -184,10 +187,7 @@ def test_gripper_factors_cancel(served_rdt: rdt.Rdt) -> None:
 
 
 def test_a_fork_without_factors_gets_none(torch: Any, tmp_path: Path) -> None:
-    texts = Embeddings(embeddings(tmp_path / "e", torch), None, "cpu", np.float32, 1024)
-    policy = rdt.Rdt(
-        OfficialRdt(torch), texts, rdt.RdtServerOptions(checkpoint="x", grippers="none")
-    )
+    policy = rdt_of(torch, tmp_path, grippers="none")
     first(policy)
     assert float(policy.model.calls[0][0][0, 13]) == 1.0
 
@@ -303,21 +303,14 @@ def test_rows_are_those_of_singles(torch: Any) -> None:
     np.testing.assert_array_equal(together[1:], alone)
 
 
-def test_later_draws_differ_and_repeat(torch: Any) -> None:
+@pytest.mark.parametrize("shape", [(1, 4), (7,)])
+def test_draws_of_one_row_differ_and_repeat_whatever_their_shape(torch: Any, shape: Any) -> None:
     drawn = []
     for _ in range(2):
         with seeded_rows([5]):
-            drawn.append((torch.rand(1, 4), torch.rand(1, 4)))
-    assert not np.array_equal(drawn[0][0], drawn[0][1])
+            drawn.append((torch.rand(*shape), torch.randn(*shape), torch.rand(*shape)))
+    assert not np.array_equal(drawn[0][0], drawn[0][2])
     np.testing.assert_array_equal(drawn[0], drawn[1])
-
-
-def test_one_row_may_draw_anything_repeatably(torch: Any) -> None:
-    drawn = []
-    for _ in range(2):
-        with seeded_rows([5]):
-            drawn.append(torch.randn(7))
-    np.testing.assert_array_equal(*drawn)
 
 
 def test_a_draw_that_belongs_to_no_row_is_refused_for_several(torch: Any) -> None:

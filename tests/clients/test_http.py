@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from run_fakes import SPEC, FakePolicy
 from standins import QUICK, Go1, Status, answered, joint_chunk, observation
 
 from robospa.action_space import ActionSpace
@@ -31,7 +31,6 @@ from robospa.clients.xpolicylab import XPolicyLabClientOptions, decode, robot_st
 from robospa.observation import Observation
 from robospa.protocol.errors import CallTimeout, HandshakeError, TransportError
 from robospa.protocol.options import option_table, plain_options, read_options, url_options
-from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.server import ServerThread
 from robospa.protocol.transport import Timeouts
 
@@ -208,25 +207,15 @@ def test_a_page_lists_every_option(dialect: Dialect) -> None:
     )
 
 
-class Zeros:
-    spec = PolicySpec("zeros", cameras=(), state="none")
-
-    def reset(self, trial: TrialInfo) -> None:
-        return None
-
-    def infer(self, observation: Observation) -> NDArray[np.float32]:
-        return np.zeros((1, 14), np.float32)
-
-
 @pytest.mark.parametrize(("scheme", "dialect"), [("ws", "robospa.v1"), ("openpi", "openpi")])
 def test_the_scheme_chooses_the_dialect(scheme: str, dialect: str) -> None:
-    with ServerThread(policy_factory=Zeros) as server:
+    with ServerThread(policy_factory=FakePolicy) as server:
         policy = connect(server.url.replace("ws://", f"{scheme}://"))
         policy.close()
     spec = policy.spec
     assert policy.dialect == dialect
     if scheme == "ws":
-        assert spec == Zeros.spec
+        assert spec == SPEC
     else:
         assert (spec.horizon, spec.text_budget) == (None, 150)
         assert [camera.name for camera in spec.cameras] == ["head", "left_wrist", "right_wrist"]

@@ -36,14 +36,12 @@ class Processor:
 class OfficialPolicy:
     """Answers the state in every row, plus noise in column 0."""
 
-    def __init__(self, torch: Any, config: Any, state: str = "observation.state") -> None:
-        self.torch, self.config, self.state = torch, config, state
+    def __init__(self, torch: Any, config: Any) -> None:
+        self.torch, self.config = torch, config
         self.calls: list[dict[str, Any]] = []
-        self.resets = 0
         self._queues: dict[str, Any] = {}
 
     def reset(self) -> None:
-        self.resets += 1
         frames = getattr(self.config, "n_obs_steps", 1)
         keys = ("action", "observation.state", "observation.images")
         self._queues = {key: deque(maxlen=frames) for key in keys}
@@ -79,10 +77,11 @@ def config(views: Any = VIEWS, state: int = 14, action: int = 14, **more: Any) -
     return SimpleNamespace(**values)
 
 
-def served(torch: Any, chosen: Any = None, **given: Any) -> lerobot.LeRobot:
+def served(torch: Any, chosen: Any = None, *steps: Any, **given: Any) -> lerobot.LeRobot:
+    """A policy behind a processor of these steps."""
     policy = OfficialPolicy(torch, chosen or config())
     options = lerobot.LeRobotServerOptions(path="x", **given)
-    return lerobot.LeRobot(policy, Processor(), Processor(), options)
+    return lerobot.LeRobot(policy, Processor(*steps), Processor(), options)
 
 
 def test_a_batch_is_what_the_data_loader_gives(torch: Any) -> None:
@@ -113,12 +112,7 @@ def test_images_renamed_in_training_are_sent_under_the_data_sets_names(torch: An
     ours = [f"observation.images.{name}" for name in ("head", "left_wrist", "right_wrist")]
     chosen = config(dict.fromkeys(keys, (3, 256, 256)))
     rename = SimpleNamespace(rename_map=dict(zip(ours, keys, strict=True)))
-    policy = lerobot.LeRobot(
-        OfficialPolicy(torch, chosen),
-        Processor(rename),
-        Processor(),
-        lerobot.LeRobotServerOptions(path="x"),
-    )
+    policy = served(torch, chosen, rename)
     assert [camera.name for camera in policy.spec.cameras] == list(COLORS)
     first(policy)
     batch = policy.before.seen[0]
@@ -131,12 +125,8 @@ def test_images_renamed_in_training_are_sent_under_the_data_sets_names(torch: An
 @pytest.mark.parametrize("declared", [6, 20])
 def test_the_state_is_as_wide_as_it_was_in_training(torch: Any, declared: int) -> None:
     stats = {"observation.state": {"count": 5.0, "mean": np.zeros(14)}}
-    policy = lerobot.LeRobot(
-        OfficialPolicy(torch, config(state=declared)),
-        Processor(SimpleNamespace(), SimpleNamespace(stats=stats)),
-        Processor(),
-        lerobot.LeRobotServerOptions(path="x"),
-    )
+    steps = SimpleNamespace(), SimpleNamespace(stats=stats)
+    policy = served(torch, config(state=declared), *steps)
     observation, _ = first(policy)
     assert np.array_equal(policy.before.seen[0]["observation.state"][0], observation["state"])
     assert policy.spec.contract[0].startswith("normalisation=")

@@ -7,6 +7,7 @@ conventions. Only if the adapter turns both ways round right do the right comman
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -102,23 +103,15 @@ class Through:
 # ---------------------------------------------------------------- the server's conventions
 
 
-def go1(desk: Desk) -> Callable[[Any], Any]:
-    return lambda seen: desk.joints(seen["state"][0])
+Model = Callable[[Any], Any]
 
 
-def openpi(desk: Desk) -> Callable[[Any], Any]:
-    return lambda seen: desk.joints(seen["state"])
+def joints(told: Callable[[Any], Array]) -> Callable[[Desk], Model]:
+    """Joints are answered, and are in a request where `told` finds them."""
+    return lambda desk: lambda seen: desk.joints(told(seen))
 
 
-def vla_eval(desk: Desk) -> Callable[[Any], Any]:
-    return lambda seen: desk.joints(seen["joint_state"])
-
-
-def robotwin(desk: Desk) -> Callable[[Any], Any]:
-    return lambda seen: desk.joints(seen["joint_action"]["vector"])
-
-
-def xpolicylab_joint(desk: Desk) -> Callable[[Any], Any]:
+def xpolicylab_joint(desk: Desk) -> Model:
     def model(seen: Any) -> Any:
         state = seen["state"]
         names = [f"{a}_{part}_joint_state" for a in ("left", "right") for part in ("arm", "ee")]
@@ -128,7 +121,7 @@ def xpolicylab_joint(desk: Desk) -> Callable[[Any], Any]:
     return model
 
 
-def xpolicylab_ee(desk: Desk) -> Callable[[Any], Any]:
+def xpolicylab_ee(desk: Desk) -> Model:
     def model(seen: Any) -> Any:
         told = np.stack([seen["state"][f"{arm}_ee_pose"] for arm in ("left", "right")])
         return [
@@ -144,7 +137,7 @@ def xpolicylab_ee(desk: Desk) -> Callable[[Any], Any]:
     return model
 
 
-def xvla(desk: Desk) -> Callable[[Any], Any]:
+def xvla(desk: Desk) -> Model:
     """Quaternions w x y z read as if x y z w, in and out, as the released checkpoint has it."""
     from scipy.spatial.transform import Rotation
 
@@ -167,23 +160,19 @@ def xvla(desk: Desk) -> Callable[[Any], Any]:
     return model
 
 
-def joint_xvla(desk: Desk) -> Callable[[Any], Any]:
-    return lambda seen: desk.joints(seen["proprio"])
-
-
-def xvla14(*args: Any) -> XVla:
-    return XVla(*args, proprio=14)
-
-
 SERVERS: dict[str, tuple[Any, Any, str]] = {
-    "go1": (Go1, go1, ""),
-    "openpi": (OpenPi, openpi, ""),
-    "vla-eval": (VlaEval, vla_eval, "?execute=none"),
-    "robotwin": (RoboTwin, robotwin, ""),
+    "go1": (Go1, joints(lambda seen: seen["state"][0]), ""),
+    "openpi": (OpenPi, joints(lambda seen: seen["state"]), ""),
+    "vla-eval": (VlaEval, joints(lambda seen: seen["joint_state"]), "?execute=none"),
+    "robotwin": (RoboTwin, joints(lambda seen: seen["joint_action"]["vector"]), ""),
     "xpolicylab joint": (XPolicyLab, xpolicylab_joint, ""),
     "xpolicylab ee": (XPolicyLab, xpolicylab_ee, "?space=ee"),
     "xvla": (XVla, xvla, ""),
-    "xvla joint": (xvla14, joint_xvla, "?space=joint&proprio=measured"),
+    "xvla joint": (
+        partial(XVla, proprio=14),
+        joints(lambda seen: seen["proprio"]),
+        "?space=joint&proprio=measured",
+    ),
 }
 
 

@@ -169,17 +169,17 @@ def test_arrays_that_cannot_be_are_refused(broken: Any) -> None:
 # -------------------- XPolicyLab's server: what exactly it is sent, and what becomes of its answers
 
 
+PARTS = {
+    "left_arm_joint_state": slice(0, 6),
+    "left_ee_joint_state": slice(6, 7),
+    "right_arm_joint_state": slice(7, 13),
+    "right_ee_joint_state": slice(13, 14),
+}
+
+
 def steps(chunk: Any) -> list[dict[str, Any]]:
     """A joint chunk as XPolicyLab's policies answer it."""
-    return [
-        {
-            "left_arm_joint_state": row[:6].astype(np.float32),
-            "left_ee_joint_state": row[6:7].astype(np.float32),
-            "right_arm_joint_state": row[7:13].astype(np.float32),
-            "right_ee_joint_state": row[13:].astype(np.float32),
-        }
-        for row in chunk
-    ]
+    return [{name: row[part].astype(np.float32) for name, part in PARTS.items()} for row in chunk]
 
 
 def test_xpolicylab_is_sent_what_its_server_reads() -> None:
@@ -220,10 +220,7 @@ def test_xpolicylab_state_is_split_by_arm() -> None:
         policy.infer(observation())
     state = server.requests[-1]["payload"]["observation"]["state"]
     assert all(value.dtype == np.float32 for value in state.values())
-    assert np.array_equal(state["left_arm_joint_state"], STATE[:6])
-    assert np.array_equal(state["left_ee_joint_state"], STATE[6:7])
-    assert np.array_equal(state["right_arm_joint_state"], STATE[7:13])
-    assert np.array_equal(state["right_ee_joint_state"], STATE[13:])
+    assert all(np.array_equal(state[name], STATE[part]) for name, part in PARTS.items())
     assert np.array_equal(state["left_ee_pose"], EE[0, :7])
     assert np.array_equal(state["right_ee_pose"], EE[1, :7])
     # Turned by 90 deg about z, the frame's x axis is the world's y axis.
@@ -259,31 +256,20 @@ def test_a_gripper_that_is_not_named_stays_when_grippers_are_turned_round() -> N
 
 
 JOINTS = np.arange(6) / 10
+LEFT_NAMES = ("left_arm_joint_state", "left_arm_joint", "left_joint_state", "arm_joint_state")
 NAMES = {
-    "left_arm_joint_state": slice(0, 6),
-    "left_arm_joint": slice(0, 6),
-    "left_joint_state": slice(0, 6),
-    "arm_joint_state": slice(0, 6),
-    "joint_state": slice(0, 6),
-    "right_arm_joint_state": slice(7, 13),
-    "right_arm_joint": slice(7, 13),
+    **dict.fromkeys((*LEFT_NAMES, "joint_state"), slice(0, 6)),
+    **dict.fromkeys(("right_arm_joint_state", "right_arm_joint"), slice(7, 13)),
     "right_joint_state": slice(7, 13),
 }
 GRIPPERS = {
-    "left_ee_joint_state": 6,
-    "left_gripper": 6,
-    "left_gripper_pos": 6,
+    **dict.fromkeys(("left_ee_joint_state", "left_gripper", "left_gripper_pos"), 6),
     "ee_joint_state": 6,
-    "right_ee_joint_state": 13,
-    "right_gripper": 13,
-    "right_gripper_pos": 13,
+    **dict.fromkeys(("right_ee_joint_state", "right_gripper", "right_gripper_pos"), 13),
 }
 POSES = {
-    "left_ee_pose": slice(0, 7),
-    "left_endpose": slice(0, 7),
-    "ee_pose": slice(0, 7),
-    "right_ee_pose": slice(8, 15),
-    "right_endpose": slice(8, 15),
+    **dict.fromkeys(("left_ee_pose", "left_endpose", "ee_pose"), slice(0, 7)),
+    **dict.fromkeys(("right_ee_pose", "right_endpose"), slice(8, 15)),
 }
 
 

@@ -4,6 +4,7 @@ import contextlib
 import ssl
 import subprocess
 import threading
+import tracemalloc
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -31,14 +32,13 @@ QUICK = Timeouts(connect=10, hello=10, reset=10, first_infer=10, infer=10, end=1
 class Recall:
     """Answers the step of the observation in every number; remembers its trials."""
 
-    def __init__(self, spec: PolicySpec = SPEC) -> None:
-        self.spec = spec
+    def __init__(self, spec: PolicySpec = SPEC, answer: Any = None) -> None:
+        self.spec, self.answer = spec, answer
         self.trials: list[TrialInfo] = []
         self.seen: list[Observation] = []
         self.outcomes: list[Any] = []
         self.fail_reset = 0
         self.fail_infer = 0
-        self.answer: Any = None
 
     def reset(self, trial: TrialInfo) -> None:
         if self.fail_reset:
@@ -186,6 +186,17 @@ def ask(transport: Transport, frame: bytes) -> Message:
     data = transport.receive(10, "answer")
     assert isinstance(data, bytes)
     return unpack(data)
+
+
+@contextlib.contextmanager
+def allocating_less_than(size: int) -> Iterator[None]:
+    """At no time in the block has it allocated `size` bytes."""
+    tracemalloc.start()
+    try:
+        yield
+        assert tracemalloc.get_traced_memory()[1] < size
+    finally:
+        tracemalloc.stop()
 
 
 def until(condition: Any) -> None:

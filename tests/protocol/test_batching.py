@@ -207,15 +207,14 @@ def test_a_full_queue_is_said_at_once() -> None:
 
 
 def test_the_timing_tells_wait_call_and_batch() -> None:
-    found = run(_ask(Batcher(batcher_of(lambda numbers: numbers).call, 2, 64, _clock), 4))
+    def clock() -> float:
+        return asyncio.get_running_loop().time()
+
+    found = run(_ask(Batcher(batcher_of(lambda numbers: numbers).call, 2, 64, clock), 4))
     times = [timing for _, timing in found]
     assert [t["batch"] for t in times] == [2, 2, 2, 2]
     assert times[0] == {"queue_ms": 0, "infer_ms": 1000, "batch": 2}
     assert times[3]["queue_ms"] == pytest.approx(1000)
-
-
-def _clock() -> float:
-    return asyncio.get_running_loop().time()
 
 
 Pause = Callable[[np.random.Generator, int, float], float]

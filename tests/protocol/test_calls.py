@@ -1,14 +1,12 @@
 """Calls of skills: what is taken, what is refused in one sentence, and the same over the wire."""
 
-from typing import Any
-
 import numpy as np
 import pytest
+from wire_helpers import Recall, begun
 
 from robospa.observation import CameraSpec
 from robospa.protocol.calls import MAX_CALLS, check_calls
-from robospa.protocol.client import connect
-from robospa.protocol.conformance import check, synthetic_observation, trial_for
+from robospa.protocol.conformance import check, synthetic_observation
 from robospa.protocol.errors import PolicyAnswerError
 from robospa.protocol.policy import PolicySpec
 from robospa.protocol.server import ServerThread
@@ -66,32 +64,15 @@ def test_what_is_taken_is_plain() -> None:
     assert len(check_calls([PICK] * MAX_CALLS, SPEC)) == MAX_CALLS
 
 
-class Answers:
-    """A policy that answers the same thing always."""
-
-    spec = SPEC
-
-    def __init__(self, answer: Any) -> None:
-        self.answer = answer
-
-    def reset(self, trial: object) -> None: ...
-
-    def infer(self, observation: Any) -> Any:
-        assert observation["calls"] == [{**PICK, "feedback": "out of reach"}] * len(
-            observation["calls"]
-        )
-        return self.answer
-
-
 def test_calls_over_the_wire() -> None:
     seen = synthetic_observation(SPEC)
     seen["calls"] = [{**PICK, "feedback": "out of reach"}]
-    with ServerThread(policy_factory=lambda: Answers([PICK])) as server:
+    with ServerThread(policy_factory=lambda: Recall(SPEC, [PICK])) as server:
         assert all(result.passed is not False for result in check(server.url))
-        with connect(server.url) as policy:
-            policy.reset(trial_for(SPEC))
-            assert policy.infer(seen) == [{**PICK, "camera": "head"}]
-    with ServerThread(Answers(["pick"])) as server, connect(server.url) as policy:
-        policy.reset(trial_for(SPEC))
-        with pytest.raises(PolicyAnswerError, match="call 1 must be a map whose 'skill'"):
-            policy.infer(seen)
+    policy = Recall(SPEC, [PICK])
+    with ServerThread(policy) as server, begun(server) as remote:
+        assert remote.infer(seen) == [{**PICK, "camera": "head"}]
+        assert policy.seen[0]["calls"] == seen["calls"]
+    refused = pytest.raises(PolicyAnswerError, match="call 1 must be a map whose 'skill'")
+    with ServerThread(Recall(SPEC, ["pick"])) as server, begun(server) as remote, refused:
+        remote.infer(seen)

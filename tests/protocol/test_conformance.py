@@ -51,10 +51,8 @@ def test_a_server_of_another_version() -> None:
 
 @pytest.mark.parametrize("bad", [np.full((2, 14), np.nan, "f4"), np.zeros((9, 14), "f4")])
 def test_a_bad_chunk_fails_the_check_of_actions(start: Any, bad: Any) -> None:
-    policy = Recall()
-    policy.answer = bad
-    options = ServerOptions(patience=0.05)
-    assert verdicts(start(policy, options=options).url)["actions"] is False
+    server = start(Recall(answer=bad), options=ServerOptions(patience=0.05))
+    assert verdicts(server.url)["actions"] is False
 
 
 def test_a_broken_promise_of_repeatability(start: Any) -> None:

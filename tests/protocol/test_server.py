@@ -4,6 +4,7 @@ import json
 import socket
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
@@ -91,9 +92,7 @@ def test_a_policy_that_wants_to_exit_does_not(start: Any) -> None:
 
 @pytest.mark.parametrize("answer", [[[0.0] * 14], np.zeros((2, 3), "f4"), np.full((2, 14), np.nan)])
 def test_what_is_no_chunk_is_reported_as_the_policys_answer(start: Any, answer: Any) -> None:
-    policy = Recall()
-    policy.answer = answer
-    with begun(start(policy)) as remote, pytest.raises(PolicyAnswerError):
+    with begun(start(Recall(answer=answer))) as remote, pytest.raises(PolicyAnswerError):
         remote.infer(observation())
 
 
@@ -268,10 +267,8 @@ def test_stopping_a_server_whose_model_hangs() -> None:
 def test_requests_that_wait_together_become_one_call(start: Any) -> None:
     policy = Together()
     server = start(policy)
-    remotes = [connect(server.url, timeouts=QUICK) for _ in range(4)]
-    for remote in remotes:
-        remote.reset(TRIAL)
-    with ThreadPoolExecutor(4) as pool:
+    with ExitStack() as stack, ThreadPoolExecutor(4) as pool:
+        remotes = [stack.enter_context(begun(server)) for _ in range(4)]
         first = pool.submit(remotes[0].infer, observation(0))
         assert policy.started.wait(10)
         rest = [pool.submit(remotes[n].infer, observation(n)) for n in (1, 2, 3)]
@@ -280,28 +277,23 @@ def test_requests_that_wait_together_become_one_call(start: Any) -> None:
         assert [future.result(10)[0, 0] for future in (first, *rest)] == [0, 1, 2, 3]
     assert [sorted(batch) for batch in policy.batches] == [[0], [1, 2, 3]]
     assert remotes[1].last_timing["batch"] == 3
-    for remote in remotes:
-        remote.close()
 
 
-def crowd(server: ServerThread, policy: Together, third: Any) -> tuple[list[Any], Any]:
-    """One request in the model, one waiting, and `third`(remote) with a queue that is full."""
-    remotes = [connect(server.url, timeouts=QUICK) for _ in range(3)]
-    for remote in remotes:
-        remote.reset(TRIAL)
-    with ThreadPoolExecutor(3) as pool:
+def crowd(start: Any, third: Any) -> Any:
+    """What `third`(pool, remote) finds of a full queue, with one request in the model and one
+    waiting; both are answered."""
+    policy = Together(size=1)
+    server = start(policy, options=ServerOptions(queue=1))
+    with ExitStack() as stack, ThreadPoolExecutor(3) as pool:
+        remotes = [stack.enter_context(begun(server)) for _ in range(3)]
         first = pool.submit(remotes[0].infer, observation(0))
         assert policy.started.wait(10)
         second = pool.submit(remotes[1].infer, observation(1))
         until(lambda: server.load.waiting == 1)
         found = third(pool, remotes[2])
         policy.open.set()
-        answers = [first.result(10)[0, 0], second.result(10)[0, 0]]
-        if hasattr(found, "result"):
-            found = found.result(10)
-    for remote in remotes:
-        remote.close()
-    return answers, found
+        assert [first.result(10)[0, 0], second.result(10)[0, 0]] == [0, 1]
+        return found and found.result(10)
 
 
 def test_too_many_waiting_requests_are_refused(start: Any) -> None:
@@ -310,9 +302,7 @@ def test_too_many_waiting_requests_are_refused(start: Any) -> None:
         with pytest.raises(CallTimeout, match=r"was busy for 0.1 s \(the server is busy"):
             remote.infer(observation(2))
 
-    policy = Together(size=1)
-    answers, _ = crowd(start(policy, options=ServerOptions(queue=1)), policy, third)
-    assert answers == [0, 1]
+    crowd(start, third)
 
 
 def test_a_busy_server_is_waited_for_within_the_trial(
@@ -326,10 +316,7 @@ def test_a_busy_server_is_waited_for_within_the_trial(
         assert refused.wait(10)
         return asked
 
-    policy = Together(size=1)
-    answers, chunk = crowd(start(policy, options=ServerOptions(queue=1)), policy, third)
-    assert answers == [0, 1]
-    assert chunk[0, 0] == 2
+    assert crowd(start, third)[0, 0] == 2
 
 
 def test_a_batch_policy_is_told_which_session_resets_and_ends(start: Any) -> None:
