@@ -26,14 +26,6 @@ from robospa.protocol.errors import (
 from robospa.protocol.server import ServerThread
 from robospa.protocol.transport import Timeouts
 
-
-def free_port() -> int:
-    with socket.socket() as sock:
-        sock.bind(("127.0.0.1", 0))
-        port: int = sock.getsockname()[1]
-    return port
-
-
 every_dialect = pytest.mark.parametrize("name", DIALECTS)
 
 
@@ -127,7 +119,8 @@ def test_numbers_that_are_not_finite_are_the_policys_error(name: str, bad: float
 
 @pytest.mark.parametrize("scheme", [dialect.scheme for dialect in dialects()])
 def test_a_server_that_is_down(scheme: str) -> None:
-    port = free_port()
+    with socket.create_server(("127.0.0.1", 0)) as closed:
+        port = closed.getsockname()[1]
     with pytest.raises(ConnectFailed, match=f"cannot connect to .*{port}.*: nothing listens there"):
         connect(f"{scheme}://127.0.0.1:{port}", timeouts=QUICK)
 
@@ -144,16 +137,7 @@ def test_greetings_hold_what_a_run_keeps(name: str) -> None:
 # ---------------------------------------------------------------- the wrong dialect
 
 
-LOOKS = {
-    "go1": "GO-1's server",
-    "gr00t": "a GR00T server",
-    "oft": "OpenVLA-OFT's server",
-    "xvla": "X-VLA's server",
-    "openpi": "an openpi server",
-    "xpolicylab": "an XPolicyLab policy server",
-    "vla-eval": "a vla-eval model server",
-    "robotwin": "RoboTwin's model server",
-}
+LOOKS = {dialect.scheme: dialect.server for dialect in dialects()}
 SPOKEN = {
     "go1": "go1+http",
     "gr00t": "gr00t",
@@ -193,7 +177,7 @@ def test_the_wrong_dialect_is_told_which_it_looks_like(
     monkeypatch.setattr(dialect, "SECONDS", 1.0 if server in SILENT else 20.0)
     with DIALECTS[server][0]() as url, pytest.raises(HandshakeError) as caught:
         use(url.replace(SPOKEN[server], SPOKEN[spoken]))
-    advice = f"looks like {LOOKS[server]}; try {SPOKEN[server]}://127.0.0.1:"
+    advice = f"looks like {LOOKS[SPOKEN[server]]}; try {SPOKEN[server]}://127.0.0.1:"
     assert advice in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -269,9 +253,7 @@ def test_check_asks_a_server_with_one_state_one_trial_at_a_time(name: str) -> No
         target = target_of(url)
         assert target.dialect.shared_state
         connector = target.connect
-        found = check(
-            url, timeouts=QUICK, connector=connector, shared_state=target.dialect.shared_state
-        )
+        found = check(url, timeouts=QUICK, connector=connector, shared_state=True)
     passed = {result.name: result.passed for result in found}
     assert passed["concurrent sessions"] is None
     assert passed["actions"]

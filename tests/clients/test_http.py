@@ -1,12 +1,11 @@
 """HTTP answers without an end: refused at their deadline, in one sentence."""
 
-import contextlib
 import itertools
 import socket
 import socketserver
 import threading
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ import numpy as np
 import pytest
 from run_fakes import SPEC, FakePolicy
 from standins import QUICK, Go1, Status, answered, joint_chunk, observation
+from wire_helpers import port_that
 
 from robospa.action_space import ActionSpace
 from robospa.clients import check_options, connect, find_endpoint
@@ -37,27 +37,17 @@ from robospa.protocol.transport import Timeouts
 
 @contextmanager
 def answering(answer: bytes) -> Iterator[JsonServer]:
-    """A client to a server that sends `answer` to every request and never ends the connection."""
-    listener = socket.create_server(("127.0.0.1", 0))
-    held: list[socket.socket] = []
+    """A client to a server that sends `answer` and never ends the connection."""
 
-    def accept() -> None:
-        with contextlib.suppress(OSError):
-            while True:
-                held.append(listener.accept()[0])
-                held[-1].recv(65536)
-                held[-1].sendall(answer)
+    def serve(peer: socket.socket) -> None:
+        peer.recv(65536)
+        peer.sendall(answer)
+        peer.recv(1)
 
-    threading.Thread(target=accept, daemon=True).start()
-    endpoint = find_endpoint(f"go1+http://127.0.0.1:{listener.getsockname()[1]}")
-    server = JsonServer(ConnectionParams(endpoint, Timeouts(connect=10)))
-    try:
-        yield server
-    finally:
-        server.close()
-        listener.close()
-        for each in held:
-            each.close()
+    with port_that(serve) as url:
+        endpoint = find_endpoint(url.replace("ws://", "go1+http://"))
+        with closing(JsonServer(ConnectionParams(endpoint, Timeouts(connect=10)))) as server:
+            yield server
 
 
 def test_a_whole_answer_without_a_length_whose_end_never_comes_is_late() -> None:

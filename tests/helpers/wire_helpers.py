@@ -1,11 +1,12 @@
 """Policies, observations and a scripted server for the wire's tests."""
 
 import contextlib
+import socket
 import ssl
 import subprocess
 import threading
 import tracemalloc
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -98,17 +99,17 @@ class Scripted:
     request's bytes. `greeting` is sent first. Frames of type str go out as text."""
 
     def __init__(self, greeting: Any, answers: Sequence[Any] = (), v1: bool = True) -> None:
-        def handler(socket: Any) -> None:
+        def handler(peer: Any) -> None:
             if greeting is not None:
-                socket.send(greeting)
+                peer.send(greeting)
             for answer in answers:
-                request = socket.recv()
+                request = peer.recv()
                 frame = answer(request) if callable(answer) else answer
                 if frame is None:
                     return
-                socket.send(frame)
+                peer.send(frame)
             with contextlib.suppress(Exception):
-                socket.recv()
+                peer.recv()
 
         self._server = serve(
             handler,
@@ -186,6 +187,21 @@ def ask(transport: Transport, frame: bytes) -> Message:
     data = transport.receive(10, "answer")
     assert isinstance(data, bytes)
     return unpack(data)
+
+
+@contextlib.contextmanager
+def port_that(serve: Callable[[socket.socket], None]) -> Iterator[str]:
+    """A port whose first client is given to `serve`, in a thread."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def first() -> None:
+            with contextlib.suppress(OSError), server.accept()[0] as peer:
+                serve(peer)
+
+        thread = threading.Thread(target=first, daemon=True)
+        thread.start()
+        yield f"ws://127.0.0.1:{server.getsockname()[1]}"
+    thread.join(10)
 
 
 @contextlib.contextmanager

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from bundle_fakes import PICK, SEEDS, all_keys, make_run
 from command_line import robospa
+from fake_runs import events, run_of, trial_record
 from run_fakes import FakePolicy, FakeWorld, parts
 
-from robospa.harness.trial import run_trial
 from robospa.leaderboard.audit import (
     audit,
     expert_likeness,
@@ -23,7 +23,6 @@ from robospa.leaderboard.audit import (
     rehearse,
     sentence_reaction,
 )
-from robospa.results.records.manifest import RunManifest
 from robospa.results.records.runs import Run, read_run, to_line
 from robospa.results.records.trial_record import RetryRow
 from robospa.tasks.catalog import build_scene
@@ -33,29 +32,25 @@ from robospa.trial import TrialKey
 KEYS = [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(40)]
 
 
-def run_of(good: int, repeated: int = 0) -> Run:
+def made(good: int, repeated: int = 0) -> Run:
     """40 trials, the first `good` of them successes and the first `repeated` of them repeated."""
-    records = {}
-    for n, key in enumerate(KEYS):
-        record = run_trial(FakeWorld(), FakePolicy(), key, policy_seed=0, parts=parts)
-        if n < repeated:
-            lost = (RetryRow("connection", "it hung up", 3),)
-            record = replace(record, attempts=2, retries=lost)
-        records[key] = replace(record, success=n < good)
-    return Run(Path(), RunManifest(), tuple(KEYS), records)
+    lost = {"attempts": 2, "retries": (RetryRow("connection", "it hung up", 3),)}
+    return run_of(
+        trial_record(key, n < good, **(lost if n < repeated else {})) for n, key in enumerate(KEYS)
+    )
 
 
 def test_success_far_above_the_hidden_rate() -> None:
-    found = hidden_gap(run_of(40), run_of(10))
+    found = hidden_gap(made(40), made(10))
     assert found.suspicious
     assert "100.0 % succeed on public seeds and 25.0 % of 40 trials on hidden" in found.sentence
-    assert not hidden_gap(run_of(22), run_of(20)).suspicious
-    assert not hidden_gap(run_of(10), run_of(40)).suspicious, "lower is no cheat"
+    assert not hidden_gap(made(22), made(20)).suspicious
+    assert not hidden_gap(made(10), made(40)).suspicious, "lower is no cheat"
 
 
 def test_repeated_trials_and_policy_errors() -> None:
-    assert not any(one.suspicious for one in faults(run_of(40)))
-    everywhere, first = faults(run_of(40, repeated=12))
+    assert not any(one.suspicious for one in faults(made(40)))
+    everywhere, first = faults(made(40, repeated=12))
     assert everywhere.suspicious and first.suspicious
     assert "level 1: 12 of 40 trials were repeated (12 attempts" in first.sentence
 
@@ -65,8 +60,8 @@ def test_successes_that_follow_other_choices(tmp_path: Path) -> None:
     folder = make_run(tmp_path / "run", all_keys(), policy=FakePolicy())
     run = read_run(folder)
     (before,) = [one for one in audit(folder, samples=0) if one.check == "choices"]
-    other = {"time": 0.0, "kind": "wrong_object", "object": "", "index": -1, "note": "", "step": 0}
-    lines = [to_line(replace(r, events=(other, *r.events))) for r in run.records.values()]
+    other = events((0.0, "wrong_object"))
+    lines = [to_line(replace(r, events=(*other, *r.events))) for r in run.records.values()]
     next((folder / "trials").glob("*.jsonl")).write_text("".join(lines))
     (after,) = [one for one in audit(folder, samples=0) if one.check == "choices"]
     assert after.suspicious and "20 of 20 successes came after" in after.sentence

@@ -8,13 +8,14 @@ from typing import Any
 
 import pytest
 from bundle_fakes import PICK, REFERENCE, Weak, World
+from fake_runs import run_of, trial_record
 from msgspec import to_builtins
 from msgspec.structs import replace as replaced
 from run_fakes import FakePolicy, parts
 from site_fakes import make_valid
 
 from robospa.harness.trial import run_trial, salt_hash
-from robospa.leaderboard.bundle import BundleError
+from robospa.leaderboard.bundle import BundleError, canonical, sha256
 from robospa.leaderboard.reproduce import (
     FIRST,
     Block,
@@ -26,8 +27,7 @@ from robospa.leaderboard.reproduce import (
     write_block,
 )
 from robospa.leaderboard.verify import Valid
-from robospa.results.records.manifest import RunManifest, RunSettings
-from robospa.results.records.runs import Run
+from robospa.results.records.manifest import RunManifest
 from robospa.results.records.trial_record import RetryRow
 from robospa.trial import CATEGORIES, TrialKey
 
@@ -44,17 +44,10 @@ def valid(tmp_path_factory: pytest.TempPathFactory) -> Valid:
 @pytest.fixture(scope="module")
 def large(valid: Valid) -> Valid:
     """As if it had 40 of 100 successes in each of 280 variants."""
-    record = next(iter(valid.run.records.values()))
-    records = {
-        (key := TrialKey(f"Task_{task}", level, seed)): replace(
-            record, key=key, success=seed < 40, category="GAC"
-        )
-        for task in range(56)
-        for level in LEVELS
-        for seed in range(100)
-    }
-    info = RunManifest(categories={f"Task_{task}": "GAC" for task in range(56)})
-    return replace(valid, run=Run(Path(), info, tuple(records), records))
+    names = [f"Task_{task}" for task in range(56)]
+    variants = [(task, level) for task in names for level in LEVELS]
+    records = [trial_record(TrialKey(*v, n), n < 40) for v in variants for n in range(100)]
+    return replace(valid, run=run_of(records, categories=dict.fromkeys(names, "GAC")))
 
 
 def block_of(count: int) -> Block:
@@ -71,8 +64,8 @@ def reproduced(
     for key in keys[:repeated]:
         lost = (RetryRow("connection", "it hung up", 5),)
         records[key] = replace(records[key], attempts=2, retries=lost)
-    manifest = RunManifest(settings=RunSettings(salt_sha256=salt_hash(salt) if salt else ""))
-    return compare(valid, Run(Path(), manifest, tuple(keys), records), keys, block)
+    settings = {"salt_sha256": salt_hash(salt) if salt else ""}
+    return compare(valid, run_of(records.values(), settings=settings), keys, block)
 
 
 def test_an_honest_claim_holds_and_an_empty_one_does_not(valid: Valid) -> None:
@@ -172,8 +165,6 @@ def test_a_block_is_read_back_under_its_commitment_and_never_written_over(tmp_pa
 def test_blocks_that_are_none_are_refused(
     tmp_path: Path, change: dict[str, Any], words: str
 ) -> None:
-    from robospa.leaderboard.bundle import canonical, sha256
-
     data = {**to_builtins(BLOCK), **change}
     (tmp_path / "b.json").write_text(json.dumps(data))
     with pytest.raises(BundleError, match=words):

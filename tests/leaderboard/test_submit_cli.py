@@ -9,7 +9,7 @@ from bundle_fakes import CARD_TEXT as CARD
 from bundle_fakes import FAKES, PICK, REFERENCE, SEEDS, Weak, make_run
 from command_line import Done, robospa
 from msgspec import to_builtins
-from run_fakes import KEYED, parts
+from run_fakes import KEYED, FakePolicy, other, parts
 from site_fakes import REPLAYED, make_valid, of_bundle
 
 from robospa.harness.running.evaluate import evaluate
@@ -40,11 +40,20 @@ def packed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def packed_for_practice(packed: Path, bundle: Path) -> Path:
-    told = ["--model", packed / "model.toml", "-o", bundle, "--practice", "--no-videos"]
-    done = submit("pack", packed / "run", *told, *FAKES)
+def pack(packed: Path, bundle: Path, *words: str) -> Done:
+    told = ["--model", packed / "model.toml", "-o", bundle, "--practice"]
+    done = submit("pack", packed / "run", *told, *FAKES, *words)
     assert done.code == 0, done.err
+    return done
+
+
+def packed_for_practice(packed: Path, bundle: Path) -> Path:
+    pack(packed, bundle, "--no-videos")
     return bundle
+
+
+def reproduced(bundle: Path, url: str, out: Path, *words: str | Path) -> Done:
+    return submit("reproduce", bundle, url, "--out", out, "--practice", *FAKES, *words)
 
 
 def hidden_block(folder: Path, count: int) -> tuple[Block, list[str | Path]]:
@@ -57,9 +66,7 @@ def hidden_block(folder: Path, count: int) -> tuple[Block, list[str | Path]]:
 
 def test_from_run_to_badge(packed: Path) -> None:
     bundle = packed / "bundle.zip"
-    words = ["--model", packed / "model.toml", "-o", bundle, "--practice", *FAKES]
-    done = submit("pack", packed / "run", *words)
-    assert done.code == 0, done.err
+    done = pack(packed, bundle)
     assert "8 trials" in done.out and "bundle " in done.out
 
     done = submit("verify", bundle, *FAKES)
@@ -72,9 +79,7 @@ def test_from_run_to_badge(packed: Path) -> None:
     done = submit("verify", bundle, *more, "--evidence", found, *FAKES)
     assert done.code == 0, done.err
     assert "valid: 8 trials of 2 variants" in done.out
-    assert (
-        "replayed: 8 of 8 trials were played again: 8 with the same outcome, 8 of them" in done.out
-    )
+    assert "replayed: 8 of 8 trials were played again: 8 with the same outcome, 8" in done.out
     assert "8/8 trials" in done.err and "if some were invented: 100.0 %" in done.out
     evidence = json.loads(found.read_text())
     assert evidence["replayed"]["identical"] == 8
@@ -82,8 +87,7 @@ def test_from_run_to_badge(packed: Path) -> None:
     told = json.loads(done.out)
     assert done.code == 0 and told == {"holds": True, "valid": evidence["valid"]}
     assert "valid: 8 trials" in done.err
-    words = ["--model", packed / "model.toml", "-o", packed / "told.zip", "--practice", "--json"]
-    (one,) = json.loads(submit("pack", packed / "run", *words, *FAKES).out)
+    (one,) = json.loads(pack(packed, packed / "told.zip", "--json").out)
     assert one["path"] == str(packed / "told.zip") and one["evidence"]["trials"] == 8
     assert one["bytes"] == (packed / "told.zip").stat().st_size == bundle.stat().st_size
     assert evidence["valid"]["bundle"] in done.out
@@ -108,8 +112,8 @@ def test_hidden_seeds_run_against_a_server(packed: Path) -> None:
     bundle = packed_for_practice(packed, packed / "again.zip")
     block, told = hidden_block(packed, 5)
     with ServerThread(policy_factory=Weak) as server:
-        words = [bundle, server.url, *told, "--out", packed / "fresh", "--practice", *FAKES]
-        done = submit("reproduce", *words, "--evidence", packed / "hidden.json")
+        more = [*told, "--evidence", packed / "hidden.json"]
+        done = reproduced(bundle, server.url, packed / "fresh", *more)
     assert done.code == 0, done.err
     assert "agrees, but earns no badge: 8 of 10 fresh trials succeeded" in done.out
     assert "A badge needs 95 % for 5 points." in done.out
@@ -124,13 +128,13 @@ def test_hidden_seeds_run_against_a_server(packed: Path) -> None:
     scenes = {r.scene_digest for r in read_run(packed / "fresh").records.values()}
     assert scenes == {parts(k, block.salt).scene.digest for k in read_run(packed / "fresh").keys}
     with ServerThread(policy_factory=Weak) as server:  # the salt is needed again to resume
-        done = submit("reproduce", bundle, server.url, *told, *words[6:], "--resume", "--json")
+        done = reproduced(bundle, server.url, packed / "fresh", *told, "--resume", "--json")
         assert done.code == 0, done.err
         assert json.loads(done.out) == {"holds": True, "badge": False, "reproduced": evidence}
         open_block = Block(block.seeds, "cd" * 32)
         write_block(open_block, packed / "other.json")
         other = ["--block", packed / "other.json", "--commitment", open_block.commitment]
-        done = submit("reproduce", bundle, server.url, *other, *words[6:], "--resume")
+        done = reproduced(bundle, server.url, packed / "fresh", *other, "--resume")
     assert done.code == 1 and "salt_sha256" in done.err
 
 
@@ -165,22 +169,18 @@ def test_inflated_numbers_are_not_reproduced(packed: Path, tmp_path: Path) -> No
     bundle = packed_for_practice(packed, tmp_path / "b.zip")
     _, told = hidden_block(tmp_path, 8)
     with ServerThread(policy_factory=Worse) as server:
-        words = [bundle, server.url, *told, "--out", tmp_path / "fresh", "--practice", *FAKES]
-        done = submit("reproduce", *words, "--evidence", tmp_path / "hidden.json")
+        done = reproduced(bundle, server.url, tmp_path / "fresh", *told)
     assert done.code == 1
     assert "NOT REPRODUCED: 0 of 16 fresh trials succeeded" in done.out
     assert f"two-sided p = {2 * (4 / 220) ** 2:.3g})" in done.out
 
 
 def test_another_server_than_the_bundles_is_refused(packed: Path, tmp_path: Path) -> None:
-    from run_fakes import FakePolicy, other
-
     bundle = packed_for_practice(packed, tmp_path / "b.zip")
     _, told = hidden_block(tmp_path, 1)
     assert FakePolicy().spec != other().spec
     with ServerThread(policy_factory=other) as server:
-        words = [bundle, server.url, *told, "--out", tmp_path / "fresh", "--practice", *FAKES]
-        done = submit("reproduce", *words)
+        done = reproduced(bundle, server.url, tmp_path / "fresh", *told)
     assert done.code == 1
     assert "is not the one of the bundle: name: 'fake' -> 'other'" in done.err
     assert not (tmp_path / "fresh").exists()

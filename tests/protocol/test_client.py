@@ -1,16 +1,26 @@
 """The client against servers that misbehave in known ways."""
 
-import contextlib
 import socket
 import struct
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from wire_helpers import HELLO, QUICK, SPEC, TRIAL, Recall, Scripted, answer, begun, observation
+from wire_helpers import (
+    HELLO,
+    QUICK,
+    SPEC,
+    TRIAL,
+    Recall,
+    Scripted,
+    answer,
+    begun,
+    observation,
+    port_that,
+)
 
 from robospa.protocol.client import connect
 from robospa.protocol.codec import Limits, decode_jpeg, encode_jpeg
@@ -48,21 +58,6 @@ def test_a_trial(start: Any) -> None:
     assert policy.trials == [TRIAL]
     assert policy.outcomes == [{"success": True}]
     assert np.array_equal(policy.seen[0]["images"]["head"], observation()["images"]["head"])
-
-
-@contextlib.contextmanager
-def port_that(serve: Callable[[socket.socket], None]) -> Iterator[str]:
-    """A port whose first client is given to `serve`, in a thread."""
-    with socket.create_server(("127.0.0.1", 0)) as server:
-
-        def first() -> None:
-            with contextlib.suppress(OSError), server.accept()[0] as peer:
-                serve(peer)
-
-        thread = threading.Thread(target=first, daemon=True)
-        thread.start()
-        yield f"ws://127.0.0.1:{server.getsockname()[1]}"
-    thread.join(10)
 
 
 def hang_up(peer: socket.socket) -> None:

@@ -6,15 +6,13 @@ import re
 import shutil
 import subprocess
 from collections.abc import Iterator
-from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import Any
 
 import pytest
-from fake_runs import outcomes, write
+from command_line import robospa
+from fake_runs import outcomes, record, write
 
-from robospa.harness.cli.main import main
 from robospa.harness.progress import Progress
 from robospa.harness.running.status import ServerStats, Status
 from robospa.results.paper.columns import published_column
@@ -169,14 +167,8 @@ def test_csv_has_a_line_a_cell_with_unrounded_numbers(tables: list[Table]) -> No
     )
     first = rows[0]
     assert (first["table"], first["group"], first["column"]) == ("main", "RDT", "L1")
-    (cell,) = (
-        r
-        for r in rows
-        if r["table"] == "main"
-        and r["group"] == "RDT"
-        and r["column"] == "L5"
-        and r["row"].startswith("Geometric")
-    )
+    cells = {(r["table"], r["group"], r["column"], r["row"]): r for r in rows}
+    cell = cells["main", "RDT", "L5", "Geometric Attribute Cognition"]
     assert (cell["text"], cell["value"]) == ("4.8", "4.75")
     small = list(csv.DictReader(io.StringIO(to_csv([SMALL]))))
     assert small[0]["row"] == "'" + EVIL  # a spreadsheet does not run it
@@ -224,13 +216,11 @@ NAMES = [
 
 def named(folder: Path, name: str) -> Run:
     """A run of a policy called `name`, whose sentences and messages say the same."""
-    good = outcomes("Pick_Blocks_Size", 1, [1, 0, 1])
-    bad = [
-        replace(r, end="policy_error", message=name, instruction=name)
-        for r in outcomes("Pick_Blocks_Size", 2, [0, 0])
-    ]
-    lost = replace(bad[0], end="infrastructure", key=replace(bad[0].key, seed=9), message=name)
-    settings: dict[str, Any] = {"policy": {"spec": {"name": name}}, "privileged": False}
+    task, said = "Pick_Blocks_Size", {"message": name, "instruction": name}
+    good = outcomes(task, 1, [1, 0, 1])
+    bad = outcomes(task, 2, [0, 0], end="policy_error", **said)
+    lost = record(task, 2, 9, 0, end="infrastructure", **said)
+    settings = {"policy": {"spec": {"name": name}}}
     about = {"warnings": [name], "policy": {"target": "ws://a", "identity": {"checkpoint": ""}}}
     return write(folder, [*good, *bad, lost], settings=settings, about=about)
 
@@ -240,29 +230,24 @@ def name(request: pytest.FixtureRequest) -> Iterator[str]:
     yield request.param
 
 
-def output(capsys: pytest.CaptureFixture[str], *words: str | Path) -> str:
+def output(*words: str | Path) -> str:
     """What a command prints; its exit code may be 1, but not by an exception."""
-    with pytest.raises(SystemExit) as stop:
-        main([*map(str, words)])
-    said = capsys.readouterr()
-    assert "MarkupError" not in said.err and "Traceback" not in said.err
-    assert not said.err.startswith("robospa: "), said.err
-    assert stop.value.code in (None, 0, 1)
-    return said.out
+    done = robospa(*words, columns=80)
+    assert "MarkupError" not in done.err and "Traceback" not in done.err
+    assert not done.err.startswith("robospa: ") and done.code in (0, 1), done.err
+    return done.out
 
 
 @pytest.mark.usefixtures("no_figures")
-def test_every_command_prints_names_as_they_are(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
-) -> None:
+def test_every_command_prints_names_as_they_are(tmp_path: Path, name: str) -> None:
     run, other = tmp_path / name.replace("/", "|"), tmp_path / "other"
     named(run, name)
     named(other, "plain")
-    assert name in output(capsys, "report", run)
-    assert run.name in output(capsys, "compare", run, other, "--variants")
-    output(capsys, "report", run, other, "--lint")
-    output(capsys, "report", run, "--failures")
-    assert _unescaped(name) in _unescaped(output(capsys, "report", run, "--failures", "--trials"))
+    assert name in output("report", run)
+    assert run.name in output("compare", run, other, "--variants")
+    output("report", run, other, "--lint")
+    output("report", run, "--failures")
+    assert _unescaped(name) in _unescaped(output("report", run, "--failures", "--trials"))
     page = (run / "report" / "report.html").read_text()
     assert "<b>x" not in page and 'evil.org"' not in page
 
