@@ -195,8 +195,7 @@ def test_a_line_ends_at_its_stop_and_is_never_faster_than_it_may() -> None:
 def test_a_stop_nearby_or_of_a_gripper_alone_is_one_action() -> None:
     start = np.array([0.0, 0.0, 1.0, 0.0], np.float32)
     for stop in ([SNAP / 2, 0, 1, 0], [0, 0, 0, 0]):
-        rows = line(start, np.array(stop, np.float32), BODIES, PERIOD)
-        assert len(rows) == 1
+        assert len(line(start, np.array(stop, np.float32), BODIES, PERIOD)) == 1
 
 
 @pytest.mark.parametrize(
@@ -237,28 +236,18 @@ def test_an_unknown_mistake_is_refused_at_once() -> None:
         ("nothing", "Press_Stapler_Repeat", "no_attempt"),
     ],
 )
-def test_a_scripted_mistake_is_labelled_as_scripted(kind: str, name: str, expected: str) -> None:
-    from robospa.harness.sim.sapien_world import SapienWorld
-    from robospa.harness.trial import run_trial
-
-    world, policy = SapienWorld(render=False), FailingOracle(kind)
+def test_a_scripted_mistake_is_labelled_as_scripted(
+    world: World, kind: str, name: str, expected: str
+) -> None:
+    policy = FailingOracle(kind)
     found = label(run_trial(world, policy, TrialKey(name, 2, SEED), policy_seed=0))
-    world.close()
     assert policy.applies and found is not None
     assert found.kind == expected
 
 
 @pytest.mark.sim
-def test_one_that_makes_all_mistakes_makes_another_in_every_trial() -> None:
-    from robospa.harness.sim.sapien_world import SapienWorld
-    from robospa.harness.trial import run_trial
-
-    world, policy, key = (
-        SapienWorld(render=False),
-        FailingOracle("all"),
-        TrialKey("Pick_Blocks_Size", 2, 930_000),
-    )
+def test_one_that_makes_all_mistakes_makes_another_in_every_trial(world: World) -> None:
+    policy, key = FailingOracle("all"), TrialKey("Pick_Blocks_Size", 2, SEED)
     found = [label(run_trial(world, policy, key, policy_seed=seed)) for seed in range(3)]
-    world.close()
     kinds = [failure and failure.kind for failure in found]
     assert kinds == ["target_grounding", None, "target_execution"]

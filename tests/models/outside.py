@@ -11,6 +11,14 @@ from robospa.protocol.transport import Timeouts
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
 PYTHON = os.environ.get("ROBOSPA_MODELS_PYTHON", str(ROOT / ".venv-models" / "bin" / "python"))
+SMALL_ACT = {
+    "dim_model": 32,
+    "n_heads": 2,
+    "dim_feedforward": 32,
+    "n_encoder_layers": 1,
+    "n_vae_encoder_layers": 1,
+    "pretrained_backbone_weights": "null",
+}
 PATIENT = Timeouts(wait=60, hello=60, reset=300, first_infer=300, infer=300)
 
 

@@ -6,18 +6,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from outside import HERE, PYTHON, ROOT, environment, ran
+from outside import HERE, PYTHON, ROOT, SMALL_ACT, environment, ran
 
 from robospa.results.records.runs import read_run
 
-SMALL_ACT = {
-    "dim_model": 32,
-    "n_heads": 2,
-    "dim_feedforward": 32,
-    "n_encoder_layers": 1,
-    "n_vae_encoder_layers": 1,
-    "pretrained_backbone_weights": "null",
-}
 CAMERAS = {
     "smolvla": ["camera1", "camera2", "camera3"],
     "xvla": ["image", "image2", "image3"],

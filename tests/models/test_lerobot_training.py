@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from outside import PATIENT, environment, ran, served
+from outside import PATIENT, SMALL_ACT, environment, ran, served
 from tiny_datasets import tiny_dataset
 
 from robospa.action_space import ActionSpace
@@ -15,16 +15,7 @@ from robospa.protocol.conformance import synthetic_observation
 from robospa.protocol.policy import TrialInfo
 
 SERVED = "robospa.clients.lerobot:create"
-SIZES = {
-    "dim_model": 32,
-    "n_heads": 2,
-    "dim_feedforward": 32,
-    "n_encoder_layers": 1,
-    "n_vae_encoder_layers": 1,
-    "pretrained_backbone_weights": "null",
-    "chunk_size": 10,
-    "n_action_steps": 10,
-}
+SIZES = {**SMALL_ACT, "chunk_size": 10, "n_action_steps": 10}
 SMALL = [f"--policy.{name}={value}" for name, value in SIZES.items()]
 SHORT = ["--batch_size=2", "--steps=2", "--num_workers=0"]
 

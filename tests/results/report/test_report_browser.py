@@ -64,6 +64,7 @@ def two_runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def page(browser: Page, report: Path) -> Iterator[Page]:
     """The report freshly opened; afterwards nothing may have gone wrong in it."""
+    browser.problems.clear()
     browser.look(1200)
     browser.open(report)
     yield browser
@@ -233,40 +234,33 @@ def test_a_film_shows_its_first_frame_and_plays_at_the_chosen_speed(page: Page) 
     assert page.run(f"{film}.playbackRate") == 4
 
 
-def test_a_trial_stands_beside_the_same_scene_in_the_other_run(
-    browser: Page, two_runs: Path
-) -> None:
-    browser.problems.clear()
-    browser.look(1200)
-    browser.open(two_runs)
-    browser.click("#list button.open")
+def test_a_trial_stands_beside_the_same_scene_in_the_other_run(page: Page, two_runs: Path) -> None:
+    page.open(two_runs)
+    page.click("#list button.open")
     ends = "[...document.querySelectorAll('.side h4 .end')].map(e => e.innerText)"
-    assert browser.run(ends) == ["step limit", "success"]
+    assert page.run(ends) == ["step limit", "success"]
     tops = "[...document.querySelectorAll('.side video')].map(v => v.getBoundingClientRect().top)"
-    assert len(set(browser.run(tops))) == 1
-    assert len(browser.run(tops)) == 2
-    browser.click(".together")
-    browser.wait("[...document.querySelectorAll('.side video')].every(v => !v.paused || v.ended)")
-    browser.look(390)
-    assert browser.run("document.documentElement.scrollWidth") == 390
-    assert browser.problems == []
+    assert len(set(page.run(tops))) == 1
+    assert len(page.run(tops)) == 2
+    page.click(".together")
+    page.wait("[...document.querySelectorAll('.side video')].every(v => !v.paused || v.ended)")
+    page.look(390)
+    assert page.run("document.documentElement.scrollWidth") == 390
 
 
-def test_a_trial_that_the_other_run_filmed_not_has_no_button(browser: Page, two_runs: Path) -> None:
-    browser.problems.clear()
-    browser.open(two_runs)
-    choose(browser, "text", "2")
-    browser.click("#list button.open")
-    assert browser.run("document.querySelectorAll('.side > div').length") == 2
-    assert browser.run("document.querySelector('.together')") is None
+def test_a_trial_that_the_other_run_filmed_not_has_no_button(page: Page, two_runs: Path) -> None:
+    page.open(two_runs)
+    choose(page, "text", "2")
+    page.click("#list button.open")
+    assert page.run("document.querySelectorAll('.side > div').length") == 2
+    assert page.run("document.querySelector('.together')") is None
     code = "document.querySelector('.side code').innerText"
     folder = two_runs.parent.parent / "one"
-    assert browser.run(code) == f"robospa view {folder} Pick_Blocks_Size-L1-2"
-    assert browser.problems == []
+    assert page.run(code) == f"robospa view {folder} Pick_Blocks_Size-L1-2"
 
 
 def test_a_flipped_pair_stands_side_by_side_once_its_axis_is_opened(
-    browser: Page, tmp_path: Path
+    page: Page, tmp_path: Path
 ) -> None:
     clean = shown("Pick_Blocks_Size", 1, 5, True, candidates=2, video="videos/a.mp4")
     other = shown("Pick_Blocks_Size", 1, 5, False, candidates=2)
@@ -274,12 +268,10 @@ def test_a_flipped_pair_stands_side_by_side_once_its_axis_is_opened(
     run = make_run(tmp_path / "run", [clean, other], settings={"profile": True})
     (tmp_path / "run" / "videos").mkdir()
     write_film(tmp_path / "run" / "videos" / "a.mp4", 2)
-    browser.problems.clear()
-    browser.open(write_report(make_report(run), tmp_path / "report") / "report.html")
-    assert browser.run("document.querySelectorAll('.pairs video').length") == 0
-    browser.click(".pairs summary")
-    browser.wait("document.querySelectorAll('.pairs .side video').length === 1")
-    text = browser.run("document.querySelector('.pairs').innerText")
+    page.open(write_report(make_report(run), tmp_path / "report") / "report.html")
+    assert page.run("document.querySelectorAll('.pairs video').length") == 0
+    page.click(".pairs summary")
+    page.wait("document.querySelectorAll('.pairs .side video').length === 1")
+    text = page.run("document.querySelector('.pairs').innerText")
     for part in ("clean: success", "blur=4: step limit", "--film makes it", other.key.slug):
         assert part in text
-    assert browser.problems == []

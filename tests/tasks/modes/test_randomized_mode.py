@@ -1,24 +1,26 @@
 """Randomised scenes: parts, their names and streams, and what they leave alone."""
 
 import json
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from scene_checks import RULES, cluttered, unseen
+from snapshots_by_hand import run
 from teleport import Teleport
 
 from robospa.geometry import Pose
 from robospa.schema import read
 from robospa.tasks import catalog
 from robospa.tasks.catalog import build_scene, tasks
-from robospa.tasks.events import Event
 from robospa.tasks.modes import canonical, clutter, for_training, tangible, with_table_raised
 from robospa.tasks.modes.randomized import OFFICIAL, VARIATIONS
 from robospa.tasks.objects import object_model
 from robospa.tasks.scene import Scene, SceneObject, Surroundings, Texture
-from robospa.tasks.snapshot import Snapshot
+from robospa.tasks.snapshot import Contact, Snapshot
+from robospa.tasks.task import Tracker
 from robospa.trial import TrialKey
 from robospa.workcell import WORKCELL
 
@@ -242,31 +244,21 @@ DISTURBED = 0.03
 """Heights are off by up to so much [m]."""
 
 
-def snapshots(scene: Scene) -> list[Snapshot]:
-    """What the goal of `scene` is shown while its plan is carried out."""
-    tracker = tasks()[scene.task].goal(scene)
-    start, update = tracker.start, tracker.update
-    seen: list[Snapshot] = []
+class Watched(Teleport):
+    """Keeps what its goal is shown."""
 
-    def keep(call):  # type: ignore[no-untyped-def]
-        def kept(snapshot: Snapshot) -> tuple[Event, ...]:
-            seen.append(snapshot)
-            return call(snapshot)  # type: ignore[no-any-return]
+    def __init__(self, scene: Scene, tracker: Tracker) -> None:
+        self.seen: list[Snapshot] = []
+        super().__init__(scene, tracker)
 
-        return kept
-
-    tracker.start, tracker.update = keep(start), keep(update)  # type: ignore[method-assign]
-    Teleport(scene, tracker).run(tasks()[scene.task].plan(scene))
-    return seen
+    def snapshot(self, contacts: Iterable[Contact] = ()) -> Snapshot:
+        self.seen.append(super().snapshot(contacts))
+        return self.seen[-1]
 
 
-def higher(point: tuple[float, float, float], by: float) -> tuple[float, float, float]:
-    x, y, z = point
-    return (x, y, z + by)
-
-
-def lifted(pose: Pose, by: float) -> Pose:
-    return Pose(higher(pose.position, by), pose.rotation)
+def up(by: float) -> Pose:
+    """What lifts a pose or a point."""
+    return Pose((0.0, 0.0, by))
 
 
 def raised(snapshot: Snapshot, by: float) -> Snapshot:
@@ -275,42 +267,37 @@ def raised(snapshot: Snapshot, by: float) -> Snapshot:
     a, b = snapshot.grasp_points
     return replace(
         snapshot,
-        poses={n: lifted(p, by) for n, p in snapshot.poses.items()},
-        end_effector=(lifted(left, by), lifted(right, by)),
-        grasp_points=(higher(a, by), higher(b, by)),
-        contacts=tuple(replace(c, point=higher(c.point, by)) for c in snapshot.contacts),
+        poses={n: up(by) * p for n, p in snapshot.poses.items()},
+        end_effector=(up(by) * left, up(by) * right),
+        grasp_points=(up(by).apply(a), up(by).apply(b)),
+        contacts=tuple(replace(c, point=up(by).apply(c.point)) for c in snapshot.contacts),
     )
 
 
 def disturbed(snapshot: Snapshot, rng: np.random.Generator) -> Snapshot:
     """Everything that may move a little higher or lower, with its gripper or not."""
     poses = {
-        name: lifted(pose, float(rng.uniform(-DISTURBED, DISTURBED)))
+        name: up(float(rng.uniform(-DISTURBED, DISTURBED))) * pose
         for name, pose in snapshot.poses.items()
     }
     return replace(snapshot, poses=poses)
 
 
-def events(scene: Scene, seen: list[Snapshot]) -> list[Event]:
-    tracker = tasks()[scene.task].goal(scene)
-    found = list(tracker.start(seen[0]))
-    for snapshot in seen[1:]:
-        found += tracker.update(snapshot)
-    return found
-
-
 @pytest.mark.parametrize("name", sorted(tasks()))
 def test_goals_say_the_same_on_a_raised_table(name: str) -> None:
     """Single-target tasks have one goal for all levels."""
-    rng = np.random.default_rng(0)
-    for level in (1, 2, 3, 4, 5) if tasks()[name].dimension == "procedural" else (1,):
+    rng, task = np.random.default_rng(0), tasks()[name]
+    for level in (1, 2, 3, 4, 5) if task.dimension == "procedural" else (1,):
         flat = build_scene(name, level, 3)
-        seen = snapshots(flat)
+        trial = Watched(flat, task.goal(flat))
+        trial.run(task.plan(flat))
+        seen = trial.seen
         if level % 2:
             seen = [seen[0], *(disturbed(s, rng) for s in seen[1:])]
         rise = RISES[level % len(RISES)]
         scene = with_table_raised(flat, rise)
-        assert events(scene, [raised(s, rise) for s in seen]) == events(flat, seen), level
+        higher = [raised(s, rise) for s in seen]
+        assert run(task.goal(scene), higher) == run(task.goal(flat), seen), level
 
 
 # ------------------ clutter lies where it is in no one's way, and is nothing that a task could mean

@@ -34,9 +34,9 @@ TIP, FINGER = 0.012, (0.0475, 0.004, 0.010)
 
 
 class Bench:
-    """The ground and what is put there, without a robot."""
+    """The ground and what is put there, without a robot; `fixed` things stay at the origin."""
 
-    def __init__(self) -> None:
+    def __init__(self, *fixed: ObjectModel) -> None:
         import sapien
         from sapien import physx
 
@@ -45,6 +45,8 @@ class Bench:
         self.scene: Any = sapien.Scene([physx.PhysxCpuSystem()])
         self.scene.set_timestep(1 / 250)
         self.scene.add_entity(ground_body("ground"))
+        for model in fixed:
+            self.put(model, Pose(), fixed=True)
 
     def put(self, model: ObjectModel, pose: Pose | None = None, fixed: bool = False) -> Any:
         """The body there; without a pose, standing on the ground."""
@@ -176,8 +178,7 @@ def test_a_mug_let_go_on_the_peg_hangs_there(look: int, yaw: float, off: float) 
     rack, mug = object_model("mug_rack"), object_model("mug", {"look": look})
     x, y, z = rack.frames["hang"].position
     handle = mug.frames["handle"].position
-    bench = Bench()
-    bench.put(rack, Pose(), fixed=True)
+    bench = Bench(rack)
     entity = bench.put(mug, put_by(handle, (x + off, y, z), yaw))
     bench.wait(3.0)
     end = pose_of(entity).apply(handle)
@@ -191,8 +192,7 @@ def test_a_mug_let_go_on_the_peg_hangs_there(look: int, yaw: float, off: float) 
 def test_a_phone_on_its_stand_stays(look: int) -> None:
     stand, phone = object_model("phone_stand"), object_model("phone", {"look": look})
     frame = stand.frames["support"]
-    bench = Bench()
-    bench.put(stand, Pose(), fixed=True)
+    bench = Bench(stand)
     x, y, z = rotate(frame.rotation, (0.0, 0.0, 0.004))
     a, b, c = frame.position
     entity = bench.put(phone, Pose((a + x, b + y, c + z), frame.rotation))
@@ -204,8 +204,7 @@ def test_a_phone_on_its_stand_stays(look: int) -> None:
 
 def test_bowls_nest_at_the_frame() -> None:
     plate, bowl = object_model("plate"), object_model("bowl")
-    bench = Bench()
-    bench.put(plate, Pose(), fixed=True)
+    bench = Bench(plate)
     nest, floor = bowl.frames["nest"].position[2], plate.frames["support"].position[2]
     stack = [bench.put(bowl, Pose((0.0, 0.0, floor + 0.001 + nest * i))) for i in range(5)]
     bench.wait(2.0)
@@ -215,8 +214,7 @@ def test_bowls_nest_at_the_frame() -> None:
 
 def test_a_bin_keeps_its_garbage_until_it_is_turned_over() -> None:
     trash_bin, ball = object_model("table_trash_bin"), object_model("garbage")
-    bench = Bench()
-    bench.put(trash_bin, Pose(), fixed=True)
+    bench = Bench(trash_bin)
     high = Pose((0.3, 0.0, 0.3), axis_rotation((1, 0, 0), 2.0))
     bench.put(trash_bin, high, fixed=True)
     kept = bench.put(ball, Pose((0.008, -0.006, 0.04)))
@@ -231,8 +229,7 @@ def test_a_bin_keeps_its_garbage_until_it_is_turned_over() -> None:
 def test_the_tray_has_two_places(asset: str, name: str) -> None:
     tray, food = object_model("tray"), object_model(asset)
     x, y, z = tray.frames[name].position
-    bench = Bench()
-    bench.put(tray, Pose(), fixed=True)
+    bench = Bench(tray)
     entity = bench.put(food, Pose((x, y, z + 0.002)))
     bench.wait(0.5)
     assert pose_of(entity).position == pytest.approx((x, y, z), abs=0.001)
