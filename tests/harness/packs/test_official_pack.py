@@ -4,14 +4,18 @@ import json
 import math
 import struct
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from made_archive import READS_MESHES, SCALE, make_archive, official_pack_in
+from made_robots import make_robot
 from mesh_writers import Piece, empty_png, glb, glb_bytes, write_glb, write_obj, write_textured_obj
 
+from robospa.baselines.oracle import Oracle
+from robospa.geometry import Pose
 from robospa.harness.official.layout import (
     OfficialLayout,
     archive_pack,
@@ -24,27 +28,32 @@ from robospa.harness.packs.mesh_files import RawMesh, check_glb, read_mesh
 from robospa.harness.packs.official import THING, OfficialPack, clutter_things, digest_of, index
 from robospa.harness.settings import Simulation
 from robospa.harness.sim.sapien_world import SapienWorld
-from robospa.harness.trial import task_parts
+from robospa.harness.trial import TrialSetup, run_trial, task_parts
 from robospa.observation import CameraSpec
+from robospa.protocol.policy import TrialInfo
 from robospa.tasks import packs
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.modes.clutter import colors_asked, keep_out, taken_kinds
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects import object_model
 from robospa.tasks.official import official_model
-from robospa.tasks.scene import Scene
+from robospa.tasks.packs import with_pack
+from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.shapes import Box, ObjectModel
 from robospa.trial import TrialKey
+from robospa.workcell import TABLE_TOP
 
 pytestmark = READS_MESHES
 
 ASSETS = ("can", "stapler", "mug", "microwave", "kitchen_pot", "hammer", "bowl")
+BREAD = ("bread", "bread_basket")
+HEAD = CameraSpec("head", 160, 120)
 
 
 @pytest.fixture(scope="module")
 def pack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OfficialPack]:
     folder = tmp_path_factory.mktemp("official")
-    root = make_archive(folder / "assets", ASSETS, ("objects", "clutter"))
+    root = make_archive(folder / "assets", (*ASSETS, *BREAD), ("objects", "clutter"))
     with pytest.MonkeyPatch.context() as patch, official_pack_in(root, folder / "cache", patch):
         yield archive_pack()
 
@@ -289,7 +298,7 @@ def test_they_are_drawn_with_their_textures_and_cannot_be_moved(pack: OfficialPa
     scene = next(s for s in map(official, keys) if len(things_in(s)) > 1)
     world = SapienWorld(render=True)
     world.load(scene)
-    image = world.render(CameraSpec("head", 160, 120)).astype(int)
+    image = world.render(HEAD).astype(int)
     poses = world.snapshot().poses
     world.close()
     assert ((image[..., 0] > 100) & (image[..., 1] < 60)).sum() > 20
@@ -461,3 +470,66 @@ def test_hostile_glb_files_are_refused_in_a_sentence(
 def test_files_that_are_none_are_refused(tmp_path: Path, content: bytes, message: str) -> None:
     with pytest.raises(ArchiveError, match=message):
         check_glb(written(tmp_path, content))
+
+
+# ------------------- in the simulator scenes are solved by the expert and drawn with their pictures
+
+
+class OfficialOracle(Oracle):
+    """Plans in the scene that the world has."""
+
+    def reset(self, trial: TrialInfo) -> None:
+        super().reset(trial)
+        assert self._scene is not None
+        self._scene = with_pack(self._scene, "official")
+
+
+def parts_of(key: TrialKey) -> TrialSetup:
+    parts = task_parts(key)
+    scene = with_pack(parts.scene, "official")
+    return TrialSetup(scene, parts.task, parts.task.goal(scene), parts.instruction)
+
+
+@pytest.mark.sim
+def test_the_expert_solves_a_scene_of_the_archive(pack: OfficialPack) -> None:
+    key = TrialKey("Click_Can_Place_Items", 2, 100_000, "aloha-agilex", "clean")
+    world = SapienWorld(render=False)
+    record = run_trial(world, OfficialOracle(), key, policy_seed=0, parts=parts_of)
+    again = run_trial(world, OfficialOracle(), key, policy_seed=0, parts=parts_of)
+    assert record.success and again.digest == record.digest
+    plain = run_trial(world, Oracle(), key, policy_seed=0, parts=partial(task_parts))
+    assert plain.success and plain.digest != record.digest
+
+
+@pytest.mark.sim
+def test_objects_are_drawn_with_their_pictures(pack: OfficialPack) -> None:
+    """A red, tinted mug in the middle of the table, drawn as large as its built-in likeness."""
+    item = SceneObject(
+        "mug", "mug", Pose((0.0, 0.0, TABLE_TOP)), {"look": 1, "tint": "red"}, fixed=True
+    )
+    scene = Scene("Test", 1, 100_000, "aloha-agilex", "clean", (item,), {})
+    world, red = SapienWorld(render=True), []
+    for shown in (scene, with_pack(scene, "official")):
+        world.load(shown)
+        image = world.render(HEAD).astype(int)
+        red.append((image[..., 0] > 2 * image[..., 1]).sum())
+    world.close()
+    assert red[0] > 60 and 0.8 < red[1] / red[0] < 1.25
+
+
+@pytest.mark.sim
+def test_robots_are_drawn_with_the_vendors_meshes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pack: OfficialPack
+) -> None:
+    """Stand-ins of a robot's links look as our own shapes: they are where those are."""
+    monkeypatch.setenv("ROBOSPA_ASSETS", str(make_robot(tmp_path, "piper")))
+    scene = Scene("Test", 1, 100_000, "piper", "clean", (), {})
+    third = CameraSpec("third", 160, 120)
+    pictures = []
+    for name in ("builtin", "official"):
+        world = SapienWorld(render=True, robot_assets=name)
+        world.load(scene)
+        pictures.append(world.render(third).astype(int))
+        world.close()
+    off = np.abs(pictures[0] - pictures[1]).max(axis=2) > 40
+    assert 0 < off.mean() < 0.02  # a plate that only the vendor has, and edges
