@@ -6,7 +6,7 @@ compared as unrelated. Variants that only one side has are left out and counted;
 over them silently. Every difference has an interval, a p, and a q corrected for how many there are.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
@@ -152,7 +152,10 @@ def compare_results(
     listed = {
         v for v in {**first.listed, **second.listed} if category[v[0]] in categories_of(metric)
     }
-    rows = [_variant_row(pair, method) for pair in pairs]
+    rows = [
+        _group_row(pair.variant[0], "variant", pair.variant[1], [pair], 1, category, method)
+        for pair in pairs
+    ]
     runs = not first.published and not second.published
     groups = _groups(pairs, listed, category, method)
     now = chance(anytime_p([pair.gap for pair in pairs if pair.gap is not None]))
@@ -213,27 +216,6 @@ def _estimate(pairs: Sequence[VariantPair], weights: Sequence[float], method: st
     return paired_mean(gaps, weights)
 
 
-def _tested(method: str) -> str:
-    """The intervals that p-values come from: the bootstrap's can be points."""
-    return METHODS[0] if method == "bootstrap" else method
-
-
-def _variant_row(pair: VariantPair, method: str) -> Difference:
-    task, level = pair.variant
-    estimate, honest = (_estimate([pair], [1.0], m) for m in (method, _tested(method)))
-    rates = pair.first.binary and pair.second.binary
-    trials = pair.first.trials if pair.gap else pair.first.trials + pair.second.trials
-    row = Difference(
-        task, "variant", level, 1, 1, trials, pair.first.value, pair.second.value, estimate, 1.0
-    )
-    if pair.gap is None:
-        p = boschloo(pair.first, pair.second) if rates else p_of_interval(honest)
-        return replace(row, p=p)
-    b, c = discordant([pair])
-    p = mcnemar_mid_p(b, c) if rates else p_of_interval(honest)
-    return replace(row, p=p, only_first=b, only_second=c)
-
-
 def _groups(
     pairs: Sequence[VariantPair], listed: set[Variant], category: Mapping[str, str], method: str
 ) -> list[Difference]:
@@ -241,11 +223,10 @@ def _groups(
     found = []
     for label, kind, chosen in collections(category):
         for level in (*levels, 0):
-            keep = _member(category, chosen, level)
-            members = [pair for pair in pairs if keep(pair.variant)]
+            own = {v for v in listed if category.get(v[0]) in chosen and level in (0, v[1])}
+            members = [pair for pair in pairs if pair.variant in own]
             if members:
-                count = sum(keep(v) for v in listed)
-                found.append(_group_row(label, kind, level, members, count, category, method))
+                found.append(_group_row(label, kind, level, members, len(own), category, method))
     return found
 
 
@@ -261,16 +242,20 @@ def _group_row(
     weights = weights_of([c.variant for c in pairs], category)
     first = sum(w * c.first.value for w, c in zip(weights, pairs, strict=True))
     second = sum(w * c.second.value for w, c in zip(weights, pairs, strict=True))
-    estimate, honest = (_estimate(pairs, weights, m) for m in (method, _tested(method)))
+    tested = METHODS[0] if method == "bootstrap" else method  # the bootstrap's can be a point
+    estimate, honest = (_estimate(pairs, weights, m) for m in (method, tested))
     paired = pairs[0].gap is not None
     trials = sum(c.first.trials + (0 if paired else c.second.trials) for c in pairs)
     row = (label, kind, level, len(pairs), listed, trials, first, second, estimate)
     other = _over_tasks(pairs, category, honest) if level and len(pairs) > 1 else None
+    rates = all(x.first.binary and x.second.binary for x in pairs)
     if not paired:
-        return Difference(*row, p_of_interval(honest), over_tasks=other)
+        exact = kind == "variant" and rates
+        p = boschloo(pairs[0].first, pairs[0].second) if exact else p_of_interval(honest)
+        return Difference(*row, p, over_tasks=other)
     b, c = discordant(pairs)
     # One weight for every trial holds inside a category; above it only the interval is fair.
-    pooled = kind in ("task", "category") and all(x.first.binary for x in pairs)
+    pooled = kind in ("variant", "task", "category") and rates
     p = mcnemar_mid_p(b, c) if pooled else p_of_interval(honest)
     return Difference(*row, p, b, c, over_tasks=other)
 
@@ -292,12 +277,6 @@ def _over_tasks(
     )
 
 
-def _member(
-    category: Mapping[str, str], chosen: Sequence[str], level: int
-) -> Callable[[Variant], bool]:
-    return lambda v: category.get(v[0]) in chosen and level in (0, v[1])
-
-
 def _corrected(rows: Sequence[Difference]) -> tuple[Difference, ...]:
     qs = benjamini_hochberg([row.p for row in rows])
     return tuple(replace(row, q=q) for row, q in zip(rows, qs, strict=True))
@@ -310,7 +289,9 @@ HEAD = 18
 def difference_table(found: RunComparison, rows: Sequence[Difference], title: str) -> Table:
     """`rows` of the comparison `found`, in percentage points."""
     several = any(row.over_tasks for row in rows)
-    names = heads_of(found.first, found.second)
+    # The ends of long names, which is where names of runs differ.
+    names = [n if len(n) <= HEAD else "…" + n[1 - HEAD :] for n in (found.first, found.second)]
+    names = names if names[0] != names[1] else ["first", "second"]
     heads = ("level", *names, "difference [95 %]", "p", "q", "trials")
     heads += ("other tasks",) * several
     heads += tuple(f"only {name}" for name in names) * found.paired
@@ -336,13 +317,6 @@ def _table_row(row: Difference, several: bool, paired: bool) -> TableRow:
     if paired:
         cells += [str(row.only_first), str(row.only_second)]
     return TableRow(f"{row.label}{partly}", tuple(map(TableCell, cells)))
-
-
-def heads_of(first: str, second: str) -> list[str]:
-    """The names of two sides, short enough to stand over columns: their ends if need be, which is
-    where names of runs differ."""
-    short = [n if len(n) <= HEAD else "…" + n[1 - HEAD :] for n in (first, second)]
-    return short if short[0] != short[1] else ["first", "second"]
 
 
 def chance(p: float) -> str:

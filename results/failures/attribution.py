@@ -53,6 +53,12 @@ def roles_of(record: TrialRecord) -> dict[str, tuple[int, ...]]:
     return found
 
 
+def took(event: EventRow) -> bool:
+    """Whether a gripper lifted an object or closed on it."""
+    closed = event["kind"] == "closed" and event.get("note") == "touching"
+    return closed or event["kind"] == "grasped"
+
+
 def _worked(events: Sequence[EventRow]) -> set[int]:
     """Closings that led to a lift of their object before the next closing on it."""
     found: set[int] = set()

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from typing import SupportsIndex, overload
 
-from robospa.results.failures.attribution import Cause, roles_of, root_of
+from robospa.results.failures.attribution import Cause, roles_of, root_of, took
 from robospa.results.records.action_problems import described, problem_counts
 from robospa.results.records.trial_record import EventRow, TrialRecord
 from robospa.results.tables import Table, TableCell, TableRow, html_fragment
@@ -69,7 +69,8 @@ def label(record: TrialRecord) -> Failure | None:
         evidence = "; ".join([_idle(record), *(one.sentence for one in problem_counts([record]))])
         return _at_end(record, "no_attempt", evidence)
     time = float(cause.event["time"])
-    return Failure(cause.kind, cause.evidence, time, cause.event.get("step"), _film(record, time))
+    film = round(time / SIMULATED_PER_FILM, 1) if record.video else None
+    return Failure(cause.kind, cause.evidence, time, cause.event.get("step"), film)
 
 
 def failures_of(records: Iterable[TrialRecord]) -> dict[TrialKey, Failure]:
@@ -109,10 +110,6 @@ _GROUPS: Mapping[str, Callable[[TrialRecord], str]] = {
 }
 
 
-def _film(record: TrialRecord, time: float) -> float | None:
-    return round(time / SIMULATED_PER_FILM, 1) if record.video else None
-
-
 def _at_end(record: TrialRecord, kind: str, evidence: str) -> Failure:
     """A failure that no event shows: the trial's last action is where it stands."""
     return Failure(kind, evidence, None, record.steps, None)
@@ -134,9 +131,7 @@ def _spatial(record: TrialRecord) -> Cause | None:
     roles = roles_of(record)
     first: dict[str, EventRow] = {}
     for event in record.events:
-        kind = event["kind"]
-        if kind == "grasped" or (kind == "closed" and event.get("note") == "touching"):
-            kind = "chosen"
+        kind = "chosen" if took(event) else event["kind"]
         first.setdefault("approached" if kind == "wrong_object" else kind, event)
     chosen, lost, beside, reached = map(first.get, ("chosen", "dropped", "closed", "approached"))
     if chosen is not None:

@@ -5,24 +5,8 @@ from pathlib import Path
 
 from robospa.results.comparison.profile import NO_COST, Profile
 from robospa.results.failures.labels import KINDS, NAMES
-from robospa.results.figures.charts import (
-    draw_bars,
-    draw_costs,
-    draw_failures,
-    draw_heat,
-    draw_latency,
-    draw_levels,
-    draw_progress,
-    has_latency,
-)
-from robospa.results.figures.series import (
-    FORMATS,
-    DrawnFigure,
-    Series,
-    percent_of,
-    save,
-    styled,
-)
+from robospa.results.figures import charts
+from robospa.results.figures.series import FORMATS, DrawnFigure, Series, percent_of, save, styled
 from robospa.results.records.manifest import JOINTS, TRACKS
 from robospa.results.scoring.grounding import MEASURES
 from robospa.results.scoring.scores import Scores
@@ -64,14 +48,14 @@ def draw(
     sizes = [len(s.scores.cells) for s in together]
     cut = sizes != [len(s.scores.cells) for s in compared]
     over = f" Over the {sizes[0]} variants that all have." if cut else ""
-    runs = [s for s in all_series if has_latency(s)]
+    runs = [s for s in all_series if charts.has_latency(s)]
     mapped = [s for s in all_series if not s.published] or all_series
     with styled():
         if any(s.scores.categories for s in together):
-            save(draw_levels(together), folder, "success", formats)
+            save(charts.draw_levels(together), folder, "success", formats)
             made.append(DrawnFigure("success", "Success against level", CAPTIONS["success"] + over))
         if any(percent_of(c, "ps") is not None for s in together for c in s.scores.cells.values()):
-            save(draw_progress(together), folder, "progress", formats)
+            save(charts.draw_progress(together), folder, "progress", formats)
             made.append(
                 DrawnFigure("progress", "Progress against success", CAPTIONS["progress"] + over)
             )
@@ -79,10 +63,10 @@ def draw(
             bars = {
                 f"{t}: {s.name}": _rates(s.scores) for t in reversed(TRACK_ORDER) for s in tracks[t]
             }
-            save(draw_bars(bars, "SR@1 [%]"), folder, "tracks", formats)
+            save(charts.draw_bars(bars, "SR@1 [%]"), folder, "tracks", formats)
             made.append(DrawnFigure("tracks", "Points, skills and joints", CAPTIONS["tracks"]))
         if runs:
-            save(draw_latency(runs), folder, "latency", formats)
+            save(charts.draw_latency(runs), folder, "latency", formats)
             made.append(DrawnFigure("latency", "Latency", CAPTIONS["latency"]))
         for number, series in enumerate(all_series, 1):
             made += _own_figures(
@@ -98,7 +82,7 @@ def draw_profile(found: Profile, folder: Path, number: int) -> list[DrawnFigure]
         return []
     name = f"profile-{number}"
     with styled():
-        save(draw_costs(costs), folder, name)
+        save(charts.draw_costs(costs), folder, name)
     return [DrawnFigure(name, "What each axis costs", CAPTIONS["profile"])]
 
 
@@ -120,19 +104,19 @@ def _own_figures(
             for measure, head in MEASURES.items()
         }
         name = f"grounding{ending}"
-        save(draw_bars(bars, "share [%]"), folder, name, formats)
+        save(charts.draw_bars(bars, "share [%]"), folder, name, formats)
         made.append(DrawnFigure(name, f"Grounding and execution{of}", CAPTIONS["grounding"]))
     counts = {
         t: found[t] for t in series.scores.tasks_by_category if any(found.get(t, {}).values())
     }
     if counts:
         name = f"failures{ending}"
-        save(draw_failures(counts, KINDS, NAMES), folder, name, formats)
+        save(charts.draw_failures(counts, KINDS, NAMES), folder, name, formats)
         caption = "Share of each failure type among a task's failed trials, and their number."
         made.append(DrawnFigure(name, f"Failure types{of}", caption))
     if series.scores.cells and mapped:
         name = f"heat{ending}"
-        save(draw_heat(series), folder, name, formats)
+        save(charts.draw_heat(series), folder, name, formats)
         caption = "Success rate [%] of every task at every level; a hatched cell has no result."
         made.append(DrawnFigure(name, f"Tasks and levels{of}", caption))
     return made

@@ -34,16 +34,13 @@ def published_cell(published: Published, model: str, task: str, level: int) -> V
     if about.category in SPATIAL:
         values["onta"] = intervals.chance_corrected(found, count)
         samples["onta"] = rate(successes, trials, count)
-        return VariantScore(
-            task, level, about.category, trials, trials, successes, values, count, samples
-        )
-    printed = published.value(model, "ps", task, level)
-    assert printed is not None, f"no PS of {task}"
-    progress = rounding.exact_progress(printed, count, trials)
-    values["ps"] = intervals.bounded_mean(progress / 100, trials)
-    return VariantScore(
-        task, level, about.category, trials, trials, successes, values, samples=samples
-    )
+    else:
+        printed = published.value(model, "ps", task, level)
+        assert printed is not None, f"no PS of {task}"
+        progress = rounding.exact_progress(printed, count, trials)
+        values["ps"], count = intervals.bounded_mean(progress / 100, trials), 0
+    shown = (about.category, trials, trials, successes, values, count, samples)
+    return VariantScore(task, level, *shown)
 
 
 def results_beside_runs(model: str, ci: str = intervals.METHODS[0]) -> models.ModelResults:

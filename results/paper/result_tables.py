@@ -58,7 +58,9 @@ def summary_table(
     rows = [(row, label, "row" if row in CATEGORY_NAMES else "average" if row else "section")
             for row, label in _summary_rows(metric)]  # fmt: skip
     levels = [int(head[1]) for head in heads if head != "Drop"]
-    wrong = _wrong(_source(name))
+    data = load()
+    redrawn = {"main": data.main, "onta": data.onta, "ps": data.ps}.get(name)
+    wrong = _wrong(redrawn.source if redrawn else "")
 
     def cell(column: Column, row: str, head: str, best: Marked) -> TableCell:
         if head == "Drop":
@@ -165,13 +167,6 @@ class _Made:
             for row in rows
             for levels in wanted
         )
-
-
-def _source(name: str) -> str:
-    """The label of the paper's table that the summary table `name` redraws; "" of ours."""
-    data = load()
-    found = {"main": data.main, "onta": data.onta, "ps": data.ps}.get(name)
-    return found.source if found else ""
 
 
 def _long_name(metric: str) -> str:

@@ -6,6 +6,7 @@ every reader of a run is told: how many actions, how large a share, one example,
 """
 
 import re
+from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
@@ -165,12 +166,12 @@ def grouped(messages: Iterable[str], most: int = 5) -> list[tuple[int, str]]:
     """How many of `messages` are of one kind and the first of them, the most frequent first; what
     is over `most` kinds becomes one last row."""
     first: dict[str, str] = {}
-    counts: dict[str, int] = {}
+    counts: Counter[str] = Counter()
     for message in messages:
         kind = error_kind(message)
         first.setdefault(kind, message or "no reason was recorded")
-        counts[kind] = counts.get(kind, 0) + 1
-    common = sorted(counts.items(), key=lambda item: -item[1])
+        counts[kind] += 1
+    common = counts.most_common()
     rows = [(count, first[kind]) for kind, count in common[:most]]
     if rest := common[most:]:
         rows.append((sum(count for _, count in rest), f"for {len(rest)} other reasons"))

@@ -302,16 +302,11 @@ class RunManifest(Struct, frozen=True, dict=True, kw_only=True):
 
     def to_json(self) -> Facts:
         """Plain JSON values, without what has no value."""
-        data = to_builtins(self)
-        parts: tuple[tuple[Facts, tuple[str, ...]], ...] = (
-            (data["settings"], OPTIONAL_SETTINGS),
-            (data["about"], OPTIONAL_ABOUT),
-        )
-        for part, names in parts:
-            for name in names:
-                if not part[name]:
-                    del part[name]
-        return dict(data)
+        data: Facts = to_builtins(self)
+        for part, names in (("settings", OPTIONAL_SETTINGS), ("about", OPTIONAL_ABOUT)):
+            found = to_builtins(getattr(self, part))
+            data[part] = {n: v for n, v in found.items() if v or n not in names}
+        return data
 
 
 @dataclass(frozen=True)
@@ -351,7 +346,7 @@ def departures(manifest: RunManifest) -> tuple[Departure, ...]:
     return tuple(found)
 
 
-OPTIONAL_SETTINGS = (*("profile", "clock", "salt_sha256", "policies", "instructions", "layout"),)
+OPTIONAL_SETTINGS = ("profile", "clock", "salt_sha256", "policies", "instructions", "layout")
 OPTIONAL_ABOUT = ("git", "policy", "policies", "arguments", "seeds", "instructions")
 
 

@@ -29,7 +29,7 @@ from robospa.results.report.report import Report, draw_figures, for_page
 from robospa.results.report.run_card import about, ends, facts, headline, percent
 from robospa.results.report.trials import failure_counts, pair_rows, trial_rows
 from robospa.results.scoring.comparable import comparable
-from robospa.results.scoring.grounding import grounding_data, records_of
+from robospa.results.scoring.grounding import grounding_data
 from robospa.results.scoring.models import ModelResults
 from robospa.results.scoring.scores import Scores, to_json
 from robospa.results.statistics.intervals import Estimate
@@ -347,7 +347,7 @@ def to_data(report: Report) -> dict[str, object]:
                 "run": about(run),
                 **to_json(model.scores),
                 "comparable": to_json(comparable(model).scores),
-                "grounding": grounding_data(records_of(model)),
+                "grounding": grounding_data(model.records),
                 "ends": ends(run),
                 "problems": problem_data(run.records.values()),
             }

@@ -137,13 +137,10 @@ def about(run: Run) -> dict[str, object]:
 
 def ends(run: Run) -> dict[str, int]:
     """Number of trials by end; trials that were never run count as "not run"."""
-    counts: dict[str, int] = {}
     not_run = STILL_TO_RUN if run.in_progress else NOT_RUN
-    for key in run.keys:
-        record = run.records.get(key)
-        name = not_run if record is None else END_NAMES[record.end]
-        counts[name] = counts.get(name, 0) + 1
-    return dict(sorted(counts.items(), key=lambda item: -item[1]))
+    records = map(run.records.get, run.keys)
+    counts = Counter(not_run if r is None else END_NAMES[r.end] for r in records)
+    return dict(counts.most_common())
 
 
 def latency(run: Run) -> dict[str, float]:
@@ -172,9 +169,8 @@ def timing(run: Run) -> dict[str, float]:
         for name, seconds in record.timing.items():
             if name != PROCESSOR:
                 sums[name] = sums.get(name, 0.0) + seconds
-    return (
-        {name: s / total for name, s in sorted(sums.items(), key=lambda p: -p[1])} if total else {}
-    )
+    longest = sorted(sums.items(), key=lambda part: -part[1])
+    return {name: seconds / total for name, seconds in longest} if total else {}
 
 
 def facts(run: Run) -> list[tuple[str, str]]:

@@ -70,8 +70,7 @@ def comparable(results: ModelResults) -> ModelResults:
     """`results` over the trials of CONDITIONS that compare; variants without any are left out."""
     records = {
         record.key: record
-        for trials in results.trials.values()
-        for record in trials.values()
+        for record in results.records
         if record.category in CONDITIONS and CONDITIONS[record.category][1](record)
     }
     ci = results.scores.ci
@@ -119,8 +118,7 @@ def _records(model: ModelResults) -> list[TrialRecord]:
     """The results of CONDITIONS' categories that say whether they compare."""
     return [
         record
-        for trials in model.trials.values()
-        for record in trials.values()
+        for record in model.records
         if record.category in CONDITIONS and {LEAD, CHUNKS} & record.diagnostics.keys()
     ]
 

@@ -7,7 +7,7 @@ it took, pressed, did too early or did once more is in the events of every recor
 from collections import Counter
 from collections.abc import Sequence
 
-from robospa.results.failures.attribution import MEMORY, mistakes_of, roles_of
+from robospa.results.failures.attribution import MEMORY, mistakes_of, roles_of, took
 from robospa.results.records.trial_record import EventRow, TrialRecord
 from robospa.results.statistics.significance import at_least
 from robospa.text import some
@@ -50,9 +50,8 @@ def took_another(record: TrialRecord) -> bool:
     """
     roles, places = roles_of(record), record.category in PROCEDURAL and record.category != MEMORY
     for event in record.events:
-        kind = event["kind"]
-        taken = kind == "grasped" or (kind == "closed" and event.get("note") == "touching")
-        if kind == "wrong_object" or (taken and not places and not roles.get(event["object"])):
+        strange = took(event) and not places and not roles.get(event["object"])
+        if strange or event["kind"] == "wrong_object":
             return True
     return False
 
@@ -80,11 +79,8 @@ def in_passing(press: EventRow, record: TrialRecord) -> bool:
 
 def held_at_start(record: TrialRecord) -> int:
     """How many subtasks held before the first action."""
-    held: set[int] = set()
-    for event in record.events:
-        if event["kind"] == "subtask_done" and event["time"] <= 0:
-            held.add(event["index"])
-    return len(held)
+    done = (e for e in record.events if e["kind"] == "subtask_done" and e["time"] <= 0)
+    return len({event["index"] for event in done})
 
 
 SHARE = 0.1

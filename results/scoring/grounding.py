@@ -6,12 +6,12 @@ turn. So of a spatial category SR@1 is the share of trials with a choice, times 
 (before chance is taken out), times the execution rate. `docs/statistics.md` has the limits.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from typing import NamedTuple
 
-from robospa.results.failures.attribution import LATE, MEMORY, ORDERED, roles_of
+from robospa.results.failures.attribution import LATE, MEMORY, ORDERED, roles_of, took
 from robospa.results.records.trial_record import EventRow, TrialRecord
 from robospa.results.scoring.first_choice import ANY_ORDER, first_choice, held_at_start, in_passing
 from robospa.results.scoring.models import ModelResults, restricted
@@ -38,17 +38,11 @@ def choices_of(record: TrialRecord) -> list[Choice]:
         return _Steps(record).choices
     roles = roles_of(record)
     for event in record.events:
-        if _took(event) or event["kind"] in ("wrong_object", "subtask_done"):
+        if took(event) or event["kind"] in ("wrong_object", "subtask_done"):
             name = event["object"]
             right = event["kind"] != "wrong_object" and bool(roles.get(name))
             return [Choice(name, right, right and first_choice(record))]
     return []
-
-
-def _took(event: EventRow) -> bool:
-    return event["kind"] == "grasped" or (
-        event["kind"] == "closed" and event.get("note") == "touching"
-    )
 
 
 @dataclass
@@ -93,7 +87,7 @@ class _Steps:
             )
         elif kind == "closed" and event.get("note") != "touching":
             self._take(event, reached=False)
-        elif _took(event):
+        elif took(event):
             self._take(event, reached=True)
         elif kind == "wrong_object":
             left = self._open(name, event["time"])
@@ -233,11 +227,6 @@ MEASURES = {"accuracy": "grounding", "execution": "execution", "no_choice": "no 
 """Fields of a `Grounding` that are estimated, and their heads."""
 
 
-def records_of(model: ModelResults) -> Iterator[TrialRecord]:
-    """All results of a run."""
-    return chain.from_iterable(trials.values() for trials in model.trials.values())
-
-
 def grounding_data(records: Iterable[TrialRecord]) -> dict[str, dict[str, dict[str, object]]]:
     """`groundings` as JSON values, by name and level."""
     made: dict[str, dict[str, dict[str, object]]] = {}
@@ -261,7 +250,7 @@ NOTE = (
 
 def grounding_table(models: Sequence[ModelResults]) -> Table | None:
     """Grounding and execution of runs by category; None where nothing is known to be chosen."""
-    return table_of([(m.name, groundings(records_of(m))) for m in models if m.trials])
+    return table_of([(m.name, groundings(m.records)) for m in models if m.trials])
 
 
 def table_of(sides: Sequence[tuple[str, Mapping[Place, Grounding]]]) -> Table | None:
@@ -295,7 +284,7 @@ def differences(first: ModelResults, second: ModelResults) -> tuple[str, ...]:
     """How two runs differ in grounding and execution over all choices of the variants that both
     have, in sentences; trials are not paired, since not every one has a choice."""
     shared = first.trials.keys() & second.trials.keys()
-    sides = [groundings(records_of(restricted(model, shared))) for model in (first, second)]
+    sides = [groundings(restricted(model, shared).records) for model in (first, second)]
     said = []
     for place in ((name, 0) for name in (*DIMENSIONS, *BASIC)):
         if all(place in side for side in sides):

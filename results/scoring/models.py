@@ -120,6 +120,11 @@ class ModelResults:
     to_run: int = 0
 
     @property
+    def records(self) -> list[TrialRecord]:
+        """All results of a run."""
+        return [record for trials in self.trials.values() for record in trials.values()]
+
+    @property
     def categories(self) -> dict[str, str]:
         """The category of every task that a trial is listed of."""
         return self.scores.category_of

@@ -7,6 +7,7 @@ Missing trials are never averaged away: a cell knows how many it lacks and betwe
 rate must lie, and every average says how many trials are missing below it."""
 
 import zlib
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -45,12 +46,8 @@ IDLE = "idle"
 
 def weights_of(variants: Sequence[Variant], category: Mapping[str, str]) -> list[float]:
     """Categories count the same, in them tasks, in them levels."""
-    tasks: dict[str, int] = {}
-    for task, _ in variants:
-        tasks[task] = tasks.get(task, 0) + 1
-    sizes: dict[str, int] = {}
-    for task in tasks:
-        sizes[category[task]] = sizes.get(category[task], 0) + 1
+    tasks = Counter(task for task, _ in variants)
+    sizes = Counter(category[task] for task in tasks)
     return [1 / (len(sizes) * sizes[category[t]] * tasks[t]) for t, _ in variants]
 
 

@@ -7,7 +7,6 @@ count included; a missing trial has no record, so what it has used is not here.
 from collections.abc import Iterable, Mapping, Sequence
 
 from robospa.results.records.trial_record import USAGE, TrialRecord
-from robospa.results.scoring.grounding import records_of
 from robospa.results.scoring.models import ModelResults
 from robospa.results.tables import Table, TableCell, TableRow
 from robospa.trial import CATEGORY_NAMES
@@ -51,12 +50,12 @@ def usage_table(models: Sequence[ModelResults]) -> Table | None:
     rows: list[TableRow] = []
     for model in models:
         by_category: dict[str, list[TrialRecord]] = {name: [] for name in CATEGORY_NAMES}
-        for record in records_of(model):
+        for record in model.records:
             by_category.setdefault(record.category, []).append(record)
         sums = {name: total(of) for name, of in by_category.items()}
         found = [TableRow(name, _cells(of)) for name, of in sums.items() if of]
         if found:
-            everything = TableRow("all", _cells(total(records_of(model))), "average")
+            everything = TableRow("all", _cells(total(model.records)), "average")
             section = [TableRow(model.name, kind="section")] * (len(models) > 1)
             rows += [*section, *found, everything]
     heads = ("trials", *COLUMNS.values(), "cost a trial")

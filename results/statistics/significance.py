@@ -132,16 +132,12 @@ def supported_best(rows: Sequence[Sequence[RateOrEstimate]]) -> list[frozenset[i
 
 def p_of_difference(first: Sample | Estimate, second: Sample | Estimate) -> float:
     """Two-sided p that two independent entries of a table have the same true value."""
-    if isinstance(first, Sample) and isinstance(second, Sample) and _both_rates(first, second):
-        return boschloo(first, second)
+    if isinstance(first, Sample) and isinstance(second, Sample) and first.binary and second.binary:
+        same = (first.scale, first.shift) == (second.scale, second.shift)
+        if same and max(first.trials, second.trials) <= LARGEST:
+            return boschloo(first, second)
     a, b = (interval_of([x]) if isinstance(x, Sample) else x for x in (first, second))
     return p_of_interval(difference(a, b))
-
-
-def _both_rates(first: Sample, second: Sample) -> bool:
-    same = (first.scale, first.shift) == (second.scale, second.shift)
-    small = max(first.trials, second.trials) <= LARGEST
-    return first.binary and second.binary and same and small
 
 
 def at_least(count: int, trials: Mapping[float, int]) -> float:
