@@ -28,16 +28,8 @@ from typing import Any
 import numpy as np
 
 from robospa.action_space import ActionSpace
+from robospa.clients import model_policy
 from robospa.clients.chunks import STATE_TOKENS, Count, RobotOption
-from robospa.clients.model_policy import (
-    Chunk,
-    ModelPolicy,
-    Query,
-    contract,
-    describe_checkpoint,
-    import_code,
-    sample_hash,
-)
 from robospa.clients.openpi_family import FamilyOptions
 from robospa.protocol.openpi import CAMERA_NAMES
 from robospa.protocol.options import option
@@ -71,10 +63,10 @@ def train_config(name: str, code: str | None = None) -> Any:
             f"{name!r} is no configuration of ours: pi05_robospa_NAME or pi05_lora_robospa_NAME, "
             "NAME being the folder of a dataset in $HF_LEROBOT_HOME/robospa"
         )
-    configs = import_code("openpi.training.config", code, SOURCES)
-    models = import_code("openpi.models.pi0_config", code, SOURCES)
-    transforms = import_code("openpi.transforms", code, SOURCES)
-    loaders = import_code("openpi.training.weight_loaders", code, SOURCES)
+    configs = model_policy.import_code("openpi.training.config", code, SOURCES)
+    models = model_policy.import_code("openpi.models.pi0_config", code, SOURCES)
+    transforms = model_policy.import_code("openpi.transforms", code, SOURCES)
+    loaders = model_policy.import_code("openpi.training.weight_loaders", code, SOURCES)
     kind: dict[str, bool | str] = {"pi05": True}
     extra: dict[str, Any] = {}
     if match["lora"]:
@@ -102,7 +94,7 @@ def train_config(name: str, code: str | None = None) -> Any:
 
 def register(name: str, code: str | None = None) -> None:
     """Add the configuration called `name` to openpi's list, from which its scripts take them."""
-    configs = import_code("openpi.training.config", code, SOURCES)
+    configs = model_policy.import_code("openpi.training.config", code, SOURCES)
     configs._CONFIGS_DICT.setdefault(name, train_config(name, code))
 
 
@@ -129,7 +121,7 @@ class OpenPiServerOptions(RobotOption):
             raise ValueError("options config and checkpoint are needed")
 
 
-class OpenPi(ModelPolicy):
+class OpenPi(model_policy.ModelPolicy):
     """A policy of openpi's `create_trained_policy`."""
 
     def __init__(
@@ -156,11 +148,11 @@ class OpenPi(ModelPolicy):
             embodiments=(options.embodiment,),
             action_dim=ActionSpace().width,
             text_budget=text_budget,
-            checkpoint=describe_checkpoint(options.checkpoint),
+            checkpoint=model_policy.describe_checkpoint(options.checkpoint),
             contract=said,
         )
 
-    def predict(self, queries: Sequence[Query]) -> list[Chunk]:
+    def predict(self, queries: Sequence[model_policy.Query]) -> list[model_policy.Chunk]:
         inputs = [FamilyOptions().request(query.observation) for query in queries]
         generators = [np.random.default_rng(query.seed) for query in queries]
         noise = [one.standard_normal(self.shape, np.float32) for one in generators]
@@ -173,8 +165,8 @@ class OpenPi(ModelPolicy):
 
 def create(options: OpenPiServerOptions) -> OpenPi:
     """Load the policy. Raises ModelMissing, and ValueError for a configuration that is refused."""
-    configs = import_code("openpi.training.config", options.code, SOURCES)
-    loading = import_code("openpi.policies.policy_config", options.code, SOURCES)
+    configs = model_policy.import_code("openpi.training.config", options.code, SOURCES)
+    loading = model_policy.import_code("openpi.policies.policy_config", options.code, SOURCES)
     if NAME.fullmatch(options.config):
         register(options.config, options.code)
     config = configs.get_config(options.config)
@@ -192,9 +184,9 @@ def create(options: OpenPiServerOptions) -> OpenPi:
     stats = sorted(Path(options.checkpoint).expanduser().glob("assets/**/norm_stats.json"))
     delta: bool | None = getattr(config.data, "use_delta_joint_actions", None)
     learned = {True: "joints, learned as differences", False: "absolute joints", None: ""}
-    said = contract(
+    said = model_policy.contract(
         options,
-        normalisation=" ".join(sample_hash(file) for file in stats),
+        normalisation=" ".join(model_policy.sample_hash(file) for file in stats),
         actions=learned[delta],
         pictures="224x224, padded",
         dtype=getattr(model, "dtype", ""),

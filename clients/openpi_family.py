@@ -29,17 +29,9 @@ from robospa.clients.chunks import ChunkOptions, Count, Targets, as_chunk, refus
 from robospa.clients.dialect import ConnectionParams, Dialect, Probe, StatelessSession
 from robospa.clients.numpy_msgpack import unpack
 from robospa.observation import CameraSpec, Observation
+from robospa.protocol import errors
 from robospa.protocol.client import WireClient, identity_of, log, open_wire
 from robospa.protocol.codec import encode
-from robospa.protocol.errors import (
-    ConnectionLost,
-    DecodeError,
-    EncodeError,
-    HandshakeError,
-    ProtocolViolation,
-    ServerError,
-    json_values,
-)
 from robospa.protocol.openpi import CAMERA_NAMES
 from robospa.protocol.options import option, read_options
 from robospa.protocol.policy import PolicySpec, TrialInfo
@@ -109,7 +101,7 @@ class FamilyOptions(ChunkOptions):
             )
         try:
             PolicySpec.from_json(self.spec("server").to_json())
-        except DecodeError as error:
+        except errors.DecodeError as error:
             raise ValueError(f"options that cannot be: {error}") from error
 
     def spec(self, name: str) -> PolicySpec:
@@ -151,7 +143,9 @@ class FamilyOptions(ChunkOptions):
         for name, image in observation.get("images", {}).items():
             if name not in self.camera_names:
                 known = ", ".join(self.camera_names)
-                raise EncodeError(f"camera {name!r} has no openpi name; cameras with one: {known}")
+                raise errors.EncodeError(
+                    f"camera {name!r} has no openpi name; cameras with one: {known}"
+                )
             small = image if self.size is None else shrunk(image, self.size)
             shown[name] = np.moveaxis(small, -1, 0) if self.layout == "chw" else small
         sent: dict[str, object] = {self.camera_names[name]: image for name, image in shown.items()}
@@ -213,7 +207,9 @@ def shrunk(image: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
     have to grow."""
     height, width = image.shape[:2]
     if size > min(height, width):
-        raise EncodeError(f"a picture of shape {image.shape} cannot be shrunk to size={size}")
+        raise errors.EncodeError(
+            f"a picture of shape {image.shape} cannot be shrunk to size={size}"
+        )
     with contextlib.suppress(ImportError):
         import cv2
 
@@ -303,19 +299,20 @@ class FamilySession(StatelessSession):
             self.close()
             raise
         spec, self._ours = options.spec(name), "robospa" in metadata
-        super().__init__(name, spec, options, preset.warnings, metadata=json_values(metadata))
+        said = errors.json_values(metadata)
+        super().__init__(name, spec, options, preset.warnings, metadata=said)
 
     def _greeting(self, timeout: float) -> Mapping[str, object]:
         metadata = self._receive(timeout, "metadata")
         if not isinstance(metadata, dict):
             raise self._violation(": metadata is not a map")
         if not self._preset.greets(metadata):
-            raise HandshakeError(
+            raise errors.HandshakeError(
                 f"{self._transport.url} does not greet as {self._preset.server} does"
             )
         for name, why in self._preset.refused.items():
             if name in metadata:
-                raise HandshakeError(f"{self._transport.url} {why}")
+                raise errors.HandshakeError(f"{self._transport.url} {why}")
         return metadata
 
     def reset(self, id: int, trial: TrialInfo) -> None:
@@ -343,7 +340,7 @@ class FamilySession(StatelessSession):
             self._renew()
         try:
             unread = self._transport.has_more()
-        except ConnectionLost as error:
+        except errors.ConnectionLost as error:
             if not self._was_cut():
                 raise
             log.warning("%s; connected again", error)
@@ -366,30 +363,30 @@ class FamilySession(StatelessSession):
         """A new connection to the same server as before."""
         self.close()
         self._transport, self._asked = self._connect(), False
-        now = {**self.hello, "metadata": json_values(self._greeting(self._timeouts.infer))}
+        now = {**self.hello, "metadata": errors.json_values(self._greeting(self._timeouts.infer))}
         if identity_of(self.hello).changes(identity_of(now)):
             self.close()
-            raise ConnectionLost(f"{self._transport.url} is another server than before")
+            raise errors.ConnectionLost(f"{self._transport.url} is another server than before")
 
     def _check(self, answer: object) -> None:
         if isinstance(answer, Mapping) and (reason := reason_of(answer)):
-            raise ServerError("an error", reason, True, self._transport.url)
+            raise errors.ServerError("an error", reason, True, self._transport.url)
 
-    def _violation(self, what: str) -> ProtocolViolation:
+    def _violation(self, what: str) -> errors.ProtocolViolation:
         self.close()
-        return ProtocolViolation(f"{self._transport.url}{what}")
+        return errors.ProtocolViolation(f"{self._transport.url}{what}")
 
     def _receive(self, timeout: float, what: str) -> object:
         data = self._transport.receive(timeout, what)
         if isinstance(data, str):
             self.close()
             lines = data.strip().splitlines() or ["no text"]
-            error = ServerError("openpi", lines[-1], True, self._transport.url)
+            error = errors.ServerError("openpi", lines[-1], True, self._transport.url)
             error.add_note(data)
             raise error
         try:
             return unpack(data, self._limits, lenient=True)
-        except DecodeError as error:
+        except errors.DecodeError as error:
             raise self._violation(f": unreadable {what}: {error}") from error
 
 

@@ -29,7 +29,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.typing import Subprotocol
 
-from robospa.protocol import messages
+from robospa.protocol import errors, messages
 from robospa.protocol.batching import QueueFull
 from robospa.protocol.calls import check_calls
 from robospa.protocol.codec import Limits, decode, decode_images
@@ -37,14 +37,6 @@ from robospa.protocol.connection_limits import (
     ConnectionLimiter,
     MonitoredConnection,
     ServerOptions,
-)
-from robospa.protocol.errors import (
-    POLICY_FAILED,
-    DecodeError,
-    PolicyAnswerError,
-    TransportError,
-    error_sentence,
-    policy_traceback,
 )
 from robospa.protocol.messages import SUBPROTOCOL, Error, Message
 from robospa.protocol.openpi import serve_openpi
@@ -89,7 +81,7 @@ class ConnectionHandler:
                 return await self._give_up(1003, "text frames do not exist in robospa.v1")
             try:
                 value = decode(data, self.limits)
-            except DecodeError as error:
+            except errors.DecodeError as error:
                 return await self._give_up(1007, str(error))
             id = value.get("id") if isinstance(value, dict) else None
             if type(id) is not int or not self._last_id < id <= messages.MAX_ID:
@@ -108,17 +100,17 @@ class ConnectionHandler:
                 return await self._infer(request)
             if isinstance(request, messages.End):
                 return await self._end(request)
-            raise DecodeError(f"a client may not send {request.type}")
-        except DecodeError as error:
+            raise errors.DecodeError(f"a client may not send {request.type}")
+        except errors.DecodeError as error:
             return Error(id, messages.BAD_MESSAGE, str(error))
-        except (QueueFull, TransportError) as error:  # or what the policy itself waits for is away
+        except (QueueFull, errors.TransportError) as error:  # or what the policy waits for is away
             return Error(id, messages.BUSY, f"the server is busy: {error}", retriable=True)
         except Exception as error:
             self._in_trial = False
-            said = error_sentence(error)
-            log.error("the policy failed: %s\n%s", said, policy_traceback(error))
+            said = errors.error_sentence(error)
+            log.error("the policy failed: %s\n%s", said, errors.policy_traceback(error))
             retriable = getattr(error, "retriable", True)
-            return Error(id, POLICY_FAILED, said, retriable, self.policy.usage)
+            return Error(id, errors.POLICY_FAILED, said, retriable, self.policy.usage)
 
     async def _reset(self, request: messages.Reset) -> Message:
         self._in_trial = False
@@ -134,14 +126,14 @@ class ConnectionHandler:
             if self.spec.image_codec == "jpeg":
                 received = await asyncio.to_thread(decode_images, received, self.limits)
             observation = check_observation(received, self.spec)
-        except DecodeError as error:
+        except errors.DecodeError as error:
             return Error(request.id, messages.BAD_OBSERVATION, str(error))
         try:
             answer, timing = await self.policy.infer(observation)
             if self.spec.action in CALLED:
                 return messages.Calls(request.id, [*check_calls(answer, self.spec)], timing)
             return messages.Actions(request.id, check_chunk(answer, self.spec), timing)
-        except PolicyAnswerError as error:
+        except errors.PolicyAnswerError as error:
             used = self.policy.usage
             return Error(request.id, messages.BAD_ANSWER, str(error), timing=used)
 
@@ -167,8 +159,8 @@ class ConnectionHandler:
 
 async def refuse(socket: MonitoredConnection, ours: bool, error: Exception) -> None:
     """Send the reason why there is no session, in either dialect, and close."""
-    reason = error_sentence(error)
-    await socket.send(messages.pack(Error(0, POLICY_FAILED, reason)) if ours else reason)
+    reason = errors.error_sentence(error)
+    await socket.send(messages.pack(Error(0, errors.POLICY_FAILED, reason)) if ours else reason)
     await socket.close(1011, "no policy for this connection")
 
 

@@ -24,15 +24,8 @@ from robospa.results.records.action_problems import (
 from robospa.results.records.manifest import LIMITS, REAL_TIME, departures
 from robospa.results.records.runs import Run, finished, lost_actions
 from robospa.results.records.trial_record import INTERRUPTED, TrialRecord
+from robospa.results.scoring import repeats
 from robospa.results.scoring.first_choice import after_others
-from robospa.results.scoring.repeats import (
-    FEW,
-    MOST_AT_LEVEL,
-    MOST_REPEATED,
-    NOTED,
-    FaultRate,
-    fault_rates,
-)
 from robospa.text import counted, some
 from robospa.trial import PROCEDURAL
 
@@ -315,16 +308,16 @@ MANY_ERRORS = 0.05
 
 def lint_faults(results: Sequence[TrialRecord], name: str) -> Iterator[Finding]:
     """Findings in the `results` of the run called `name`."""
-    whole, *levels = fault_rates(results)
+    whole, *levels = repeats.fault_rates(results)
     bad = [rate for rate in (whole, *levels) if rate.too_many]
     for rate in bad:
-        most = MOST_AT_LEVEL if rate.level else MOST_REPEATED
+        most = repeats.MOST_AT_LEVEL if rate.level else repeats.MOST_REPEATED
         text = (
-            f"{_counted(rate)}, more than {100 * most:g} % (or {FEW}): each had another chance "
-            "after a fault that its policy may have caused"
+            f"{_counted(rate)}, more than {100 * most:g} % (or {repeats.FEW}): each had another "
+            "chance after a fault that its policy may have caused"
         )
         yield Finding("repeated-trials", "error", name, text)
-    if not bad and whole.repeated > NOTED * whole.results:
+    if not bad and whole.repeated > repeats.NOTED * whole.results:
         text = f"{_counted(whole)}: each had another chance after a fault"
         yield Finding("repeated-trials", "warning", name, text)
     if whole.policy_errors > MANY_ERRORS * whole.results:
@@ -337,6 +330,6 @@ def lint_faults(results: Sequence[TrialRecord], name: str) -> Iterator[Finding]:
         yield Finding("policy-errors", "warning", name, text)
 
 
-def _counted(rate: FaultRate) -> str:
+def _counted(rate: repeats.FaultRate) -> str:
     where = f" at level {rate.level}" if rate.level else ""
     return f"{rate.repeated} of {rate.results} trials{where} were repeated"

@@ -140,20 +140,16 @@ class _Reader:
 
     def _closed(self, event: EventRow) -> None:
         self.miss = None
-        name, touching = event["object"], event.get("note") == "touching"
-        if touching:
+        name = event["object"]
+        if took(event):
             self._taken(event, "closed on")
         else:
-            needs = self._aimed_at(name)
+            # the open subtasks of the object beside which it closed, else what was due
+            due = next((i for i in range(self.total) if i not in self.done), -1)
+            needs = tuple(i for i in self.roles.get(name, ()) if i not in self.done) or (due,)
             self.tried.update(needs)
             self._add("manipulation", event, f"closed beside {name} and touched nothing", needs)
             self.miss = self.mistakes[-1]
-
-    def _aimed_at(self, name: str) -> tuple[int, ...]:
-        """The open subtasks of the object beside which a gripper closed, else what was due."""
-        mine = tuple(i for i in self.roles.get(name, ()) if i not in self.done)
-        due = next((i for i in range(self.total) if i not in self.done), -1)
-        return mine or (due,)
 
     def _taken(self, event: EventRow, did: str) -> None:
         """A gripper has an object between its fingers: was it its turn?"""
@@ -165,7 +161,9 @@ class _Reader:
         index = next((i for i in subtasks if i not in self.done), subtasks[0])
         early = self._out_of_turn(index)
         self.tried.add(index)
-        if self._was_done(index, event["time"]) and index not in self.idle:
+        # Whether it held until a gripper closed on its object now or just before.
+        held = index in self.done or event["time"] - self.undone.get(index, -LATE) < LATE
+        if held and index not in self.idle:
             for mistake in [m for m in self.mistakes if self._undoing(m, index, event["time"])]:
                 self.mistakes.remove(mistake)
             self._add("redundant_repetition", event, f"{did} {name} again, which was done")
@@ -188,10 +186,6 @@ class _Reader:
         if any(i not in self.tried for i in range(index)):
             return True
         return any(i > index and i not in self.ever for i in self.tried)
-
-    def _was_done(self, index: int, time: float) -> bool:
-        """Whether a subtask held until a gripper closed on its object at `time` or just before."""
-        return index in self.done or time - self.undone.get(index, -LATE) < LATE
 
     def _undoing(self, mistake: _Mistake, index: int, time: float) -> bool:
         """Whether a mistake is only that subtask `index` was undone by what happens at `time`."""
@@ -218,10 +212,8 @@ class _Reader:
         kind = "memory" if self.category == MEMORY else "temporal_ordering"
         evidence = f"{name} was done before it was its turn"
         if any(i in self.ever and i != event["index"] for i in self.roles.get(name, ())):
-            kind, evidence = (
-                "redundant_repetition",
-                f"{name} was done again instead of what was due",
-            )
+            kind = "redundant_repetition"
+            evidence = f"{name} was done again instead of what was due"
         needs = tuple(range(event["index"] + 1))
         self._add(kind, event, evidence, needs, plain=self.category in ORDERED)
 
@@ -244,9 +236,7 @@ class _Reader:
         """The first plain mistake that was not put right, else the first trace of one."""
         left = [m for m in self.mistakes if not self._forgiven(m)]
         plain = [m for m in left if m.plain]
-        if not left:
-            return None
-        return self._worst(plain or left)
+        return self._worst(plain or left) if left else None
 
     def _forgiven(self, mistake: _Mistake) -> bool:
         if mistake.needs:
@@ -257,11 +247,8 @@ class _Reader:
         """The first; of a failed grasp, its end: the drop is what a viewer wants to see."""
         first = mistakes[0]
         if first.cause.kind == "manipulation" and first.needs:
-            same = [
-                m for m in mistakes if m.needs == first.needs and m.cause.event["kind"] == "dropped"
-            ]
-            if same:
-                return same[0].cause
+            same = (m.cause for m in mistakes if m.needs == first.needs)
+            return next((c for c in same if c.event["kind"] == "dropped"), first.cause)
         return first.cause
 
 

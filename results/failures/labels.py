@@ -140,13 +140,11 @@ def _spatial(record: TrialRecord) -> Cause | None:
             return Cause("target_grounding", chosen, f"took {name}, which was not asked for")
         if lost is not None and lost["object"] == name:
             return Cause("target_execution", lost, f"took the target, {name}, and dropped it")
-        return Cause(
-            "target_execution", chosen, f"closed on the target, {name}, but did not lift it"
-        )
+        text = f"closed on the target, {name}, but did not lift it"
+        return Cause("target_execution", chosen, text)
     if beside is not None:
-        return Cause(
-            "no_contact_grasp", beside, f"closed beside {beside['object']} and touched nothing"
-        )
+        text = f"closed beside {beside['object']} and touched nothing"
+        return Cause("no_contact_grasp", beside, text)
     if reached is None:
         return None
     name = reached["object"]
@@ -246,8 +244,7 @@ def failed_trials(records: Iterable[TrialRecord]) -> FailedTrials:
     """Every failed trial among `records`, in the order of their keys."""
     found = FailedTrials()
     for record in sorted(records, key=lambda r: r.key):
-        failure = label(record)
-        if failure is not None:
+        if (failure := label(record)) is not None:
             found.append(
                 FailedTrial(
                     **asdict(record.key),

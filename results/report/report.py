@@ -95,8 +95,11 @@ def make_report(
     parts = [part for run in whole for part in by_setting(run)]
     runs = [p for p in parts if not p.manifest.settings.profile or p.keys[0].mode == CLEAN]
     own = [results_of_run(run, name, ci) for run, name in zip(runs, names_of(runs), strict=True)]
-    others = [beside_runs(results_beside_runs(model, ci), own) for model in published]
+    has_results = set().union(*map(with_results, own))
+    others = [restricted(results_beside_runs(model, ci), has_results) for model in published]
     models = [*own, *others]
+    lost = [(model.name, missing_lines(model.scores)) for model in own]
+    lost += [(model.name, loss_lines(run)) for model, run in zip(own, runs, strict=True)]
     columns, refused = columns_of(models)
     return Report(
         runs,
@@ -106,15 +109,7 @@ def make_report(
         columns,
         [*_of_runs(profiles), *_tables(own, columns), *_of_runs(measured)],
         [failures_of(run.records.values()) for run in runs],
-        [
-            f"{model.name}: {line}" if len(runs) > 1 else line
-            for lines in (
-                [(model, missing_lines(model.scores)) for model in models[: len(runs)]],
-                [(model, loss_lines(run)) for model, run in zip(models, runs, strict=False)],
-            )
-            for model, found in lines
-            for line in found
-        ],
+        [f"{name}: {line}" if len(runs) > 1 else line for name, lines in lost for line in lines],
         [*refused, *findings(whole)],
         [origin_of(own), *method_notes(columns)],
         profiles,
@@ -139,20 +134,12 @@ def _tables(own: Sequence[ModelResults], columns: Sequence[Column]) -> list[Repo
     made = []
     for track, members in tracks.items():
         mine = [column for column in columns if column.results in members]
-        found = _track_tables([model for model in own if model in members], mine)
-        if len(tracks) > 1:
-            found = [
-                replace(
-                    one,
-                    table=replace(
-                        one.table,
-                        name=f"{track}-{one.table.name}",
-                        title=f"{one.table.title}, track {track}",
-                    ),
-                )
-                for one in found
-            ]
-        made += found
+        for one in _track_tables([model for model in own if model in members], mine):
+            table = one.table
+            if len(tracks) > 1:
+                title = f"{table.title}, track {track}"
+                table = replace(table, name=f"{track}-{table.name}", title=title)
+            made.append(ReportTable(table, one.folded))
     return made
 
 
@@ -256,11 +243,6 @@ def over_shared(models: Sequence[ModelResults]) -> list[ModelResults]:
         else model
         for model in begun
     ]
-
-
-def beside_runs(published: ModelResults, runs: Sequence[ModelResults]) -> ModelResults:
-    """`published` over the variants that any of `runs` has results of."""
-    return restricted(published, set().union(*map(with_results, runs)))
 
 
 FEW = 2
