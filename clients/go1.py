@@ -152,15 +152,13 @@ class Go1(model_policy.ModelPolicy):
     def predict(self, queries: Sequence[model_policy.Query]) -> list[model_policy.Chunk]:
         chunks = []
         for query in queries:
+            # what its server would have read from the wire, in arrays of its own
+            sent = self.options.inputs(query.observation).items()
+            own = {k: np.array(v) if isinstance(v, np.ndarray) else v for k, v in sent}
             with model_policy.seeded_rows([query.seed]):
-                answer = self.model.inference(self._payload(query))
+                answer = self.model.inference(own)
             chunks.append(np.array(answer, np.float32)[: self.options.horizon])
         return chunks
-
-    def _payload(self, query: model_policy.Query) -> dict[str, Any]:
-        """What its server would have read from the wire, in arrays of its own."""
-        inputs = self.options.inputs(query.observation)
-        return {k: np.array(v) if isinstance(v, np.ndarray) else v for k, v in inputs.items()}
 
 
 def create(options: Go1ServerOptions) -> Go1:

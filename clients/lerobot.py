@@ -78,13 +78,6 @@ class ImageInput:
     height: int
 
 
-def sources_of(before: Any) -> dict[str, str]:
-    """The data set's name of each image that the processors `before` rename (`rename_map` of
-    `lerobot-train`), by the policy's name."""
-    maps = [getattr(step, "rename_map", None) or {} for step in getattr(before, "steps", ())]
-    return {theirs: source for one in maps for source, theirs in one.items()}
-
-
 def match_cameras(
     features: Mapping[str, Sequence[int]],
     images: str | None,
@@ -202,7 +195,9 @@ class LeRobot(model_policy.ModelPolicy):
         unknown = sorted(inputs.keys() - ours)
         if unknown:
             raise ValueError(f"the policy wants {', '.join(unknown)}, which we do not have")
-        self.sources = sources_of(before)
+        # the data set's name of each image that the processors rename (`rename_map`)
+        maps = [getattr(step, "rename_map", None) or {} for step in getattr(before, "steps", ())]
+        self.sources = {theirs: source for one in maps for source, theirs in one.items()}
         self.views = match_cameras(images, options.images, self.sources)
         width = int(config.output_features["action"].shape[0])
         self.encoding = StateEncoding(
@@ -213,9 +208,11 @@ class LeRobot(model_policy.ModelPolicy):
             options.grippers,
             options.closed_above,
         )
+        joint = self.encoding.space == "joint"
         self.state: str | None = None
-        if STATE in inputs:
-            self.state = self._state_space(_state_width(before) or int(inputs[STATE][0]), width)
+        if STATE in inputs:  # joints, as the actions are, or what else is as wide
+            wide = _state_width(before) or int(inputs[STATE][0])
+            self.state = "joint" if joint and wide == width else _space(wide, "state")
         frames = int(getattr(config, "n_obs_steps", 1) or 1)
         self.history = tuple(range(1 - frames, 0))
         if self.history and (self.state or "joint") != "joint":
@@ -226,7 +223,6 @@ class LeRobot(model_policy.ModelPolicy):
         execute = options.execute or min(int(config.n_action_steps), int(horizon))
         if execute > horizon:
             raise ValueError(f"option execute={execute}: at most the policy's horizon {horizon}")
-        joint = self.encoding.space == "joint"
         self.spec = PolicySpec(
             name=f"lerobot:{config.type}",
             cameras=tuple(CameraSpec(view.camera) for view in self.views),
@@ -245,11 +241,6 @@ class LeRobot(model_policy.ModelPolicy):
             ),
             environment_state=OBJECTS in inputs,
         )
-
-    def _state_space(self, width: int, actions: int) -> str:
-        """What a state of this `width` is: joints, as the actions are, or what else is as wide."""
-        joint = self.encoding.space == "joint"
-        return "joint" if joint and width == actions else _space(width, "state")
 
     def predict(self, queries: Sequence[model_policy.Query]) -> list[model_policy.Chunk]:
         try:

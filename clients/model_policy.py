@@ -84,15 +84,10 @@ class ModelPolicy:
         queries = []
         for observation, session in zip(observations, sessions, strict=True):
             trial, memory = self._trials[session]
-            seed = seed_of(trial.policy_seed, int(observation["step"]))
+            source = np.random.SeedSequence([trial.policy_seed, int(observation["step"])])
+            seed = int(source.generate_state(1, np.uint64)[0]) >> 1  # 0 to 2^63 - 1
             queries.append(Query(observation, trial, seed, memory))
         return self.predict(queries)
-
-
-def seed_of(policy_seed: int, step: int) -> int:
-    """The seed, 0 to 2^63 - 1, of one prediction."""
-    word = np.random.SeedSequence([policy_seed, step]).generate_state(1, np.uint64)[0]
-    return int(word) >> 1
 
 
 def import_code(module: str, code: str | None, whose: str) -> Any:
@@ -221,10 +216,7 @@ def seeded_rows(seeds: Sequence[int]) -> Iterator[None]:
     torch = import_torch()
     generators = [torch.Generator("cpu").manual_seed(seed) for seed in seeds]
     torch.manual_seed(seeds[0])
-    like = {
-        torch.randn_like: torch.randn,
-        torch.rand_like: torch.rand,
-    }
+    like = {torch.randn_like: torch.randn, torch.rand_like: torch.rand}
     fresh = {torch.randn, torch.rand}
     inplace = {torch.Tensor.normal_, torch.Tensor.uniform_}
     others = {
@@ -259,20 +251,16 @@ def seeded_rows(seeds: Sequence[int]) -> Iterator[None]:
 
         def drawn(self, function: Any, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
             """The numbers by row; None where the call is none of ours."""
-            result = None
+            result, dtype, device = None, kwargs.get("dtype"), kwargs.get("device")
             if function in fresh:
-                result = rows(
-                    function, _shape(args, kwargs), kwargs.get("dtype"), kwargs.get("device")
-                )
+                result = rows(function, _shape(args, kwargs), dtype, device)
             elif function in like:
                 model = args[0]
-                dtype, device = kwargs.get("dtype"), kwargs.get("device")
-                result = rows(
-                    like[function], model.shape, dtype or model.dtype, device or model.device
-                )
+                dtype, device = dtype or model.dtype, device or model.device
+                result = rows(like[function], model.shape, dtype, device)
             elif function is torch.normal and "size" in kwargs:
                 mean, std = _two(args, kwargs, "mean", "std", (0.0, 1.0))
-                unit = rows(torch.randn, kwargs["size"], kwargs.get("dtype"), kwargs.get("device"))
+                unit = rows(torch.randn, kwargs["size"], dtype, device)
                 result = None if unit is None else unit * std + mean
             elif function in inplace:
                 target, normal = args[0], function is torch.Tensor.normal_

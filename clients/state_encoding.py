@@ -107,8 +107,12 @@ class StateEncoding:
 
     def state(self, query: Query, space: str | None = None) -> NDArray[np.float32]:
         """The state in `space` (that of the actions unless given), float32 (D,), (16,), (20,)."""
-        space = space or self.space
-        last = self._last_command(query) if space == self.space else None
+        space, last = space or self.space, None
+        if (
+            space == self.space and self.proprio != "measured"
+        ):  # the action just executed stands for it
+            done = int(query.observation["step"]) - int(query.memory.get("asked_at", 0))
+            last = last_executed(query.memory.get("chunk"), done)
         if space == "joint":
             joints = np.array(query.observation["state"] if last is None else last, np.float32)
             if self.grippers == "closed":
@@ -139,10 +143,3 @@ class StateEncoding:
                 chunk[:, columns] = np.where(np.isnan(closed), np.nan, closed <= self.closed_above)
         query.memory["chunk"], query.memory["asked_at"] = chunk, int(query.observation["step"])
         return chunk
-
-    def _last_command(self, query: Query) -> Chunk | None:
-        """The action executed just before this query, if that is its proprioception."""
-        if self.proprio == "measured":
-            return None
-        done = int(query.observation["step"]) - int(query.memory.get("asked_at", 0))
-        return last_executed(query.memory.get("chunk"), done)

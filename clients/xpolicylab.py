@@ -32,13 +32,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from robospa.action_space import ARMS, POSE, SIX_JOINT_ARMS, ActionSpace
-from robospa.clients.chunks import (
-    NAMED,
-    AnyModelOptions,
-    as_chunk,
-    invert_grippers,
-    refuse_unread,
-)
+from robospa.clients.chunks import NAMED, AnyModelOptions, as_chunk, invert_grippers, refuse_unread
 from robospa.clients.dialect import Answer, ConnectionParams, Dialect, Probe, StatelessSession
 from robospa.clients.numpy_msgpack import MsgpackSocket, binary_form
 from robospa.geometry import quaternion_to_matrix

@@ -127,7 +127,6 @@ def verify_bundle(
     parts: Hidden = None,
 ) -> None:
     """Check a bundle; with --challenge also replay a sample. Offline; nothing is unpacked."""
-
     if challenge is not None:
         evidence.check_challenge(challenge)
         evidence.sample_size(fraction, 1)
@@ -178,7 +177,6 @@ def block(
     parts: Hidden = None,
 ) -> None:
     """Draw hidden scenes that the expert solves, and print the commitment to publish beforehand."""
-
     valid = verify(bundle, rules.shipped(world, parts), practice)
     count = reproduce.plan(valid, trials)
     variants = list(dict.fromkeys(key.variant for key in valid.keys))
@@ -188,11 +186,9 @@ def block(
     drawn = reproduce.draw_block(variants, count, workers or cores(), say, robot, mode)
     reproduce.write_block(drawn, out)
     say(f"Keep {out} secret until the trials are over. Publish now:")
-    if as_json:
-        known = {"block": out, "trials": count, "variants": len(variants)}
-        print_json({**known, "commitment": drawn.commitment})
-    else:
-        print(f"commitment {drawn.commitment}")
+    known = {"block": out, "trials": count, "variants": len(variants)}
+    told = {**known, "commitment": drawn.commitment}
+    _tell(as_json, told, f"commitment {drawn.commitment}")
 
 
 @submit.command("reproduce")
@@ -212,7 +208,6 @@ def reproduce_bundle(
     parts: Hidden = None,
 ) -> None:
     """Run hidden scenes on the submitter's server and test exactly whether they agree."""
-
     reference = rules.shipped(world, parts)
     valid = verify(bundle, reference, practice)
     seeds = reproduce.read_block(block, commitment)
@@ -232,11 +227,9 @@ def reproduce_bundle(
     compared = reproduce.compare(valid, read_run(out), keys, seeds)
     earned = "reproduced" if compared.enough else "agrees, but earns no badge"
     verdict = earned if compared.holds else "NOT REPRODUCED"
-    if as_json:
-        held = {"holds": compared.holds, "badge": compared.holds and compared.enough}
-        print_json({**held, "reproduced": to_builtins(compared)})
-    else:
-        print(f"{verdict}: " + " ".join(compared.sentences()))
+    held = {"holds": compared.holds, "badge": compared.holds and compared.enough}
+    told = {**held, "reproduced": to_builtins(compared)}
+    _tell(as_json, told, f"{verdict}: " + " ".join(compared.sentences()))
     if evidence_file is not None:
         _write(evidence_file, {"reproduced": to_builtins(compared)})
     if not compared.holds:
@@ -254,10 +247,7 @@ def build(
     if not submissions.is_dir():
         note(f"There is no folder {submissions}: the site has the published models only.")
     index = site.build(submissions, out, note)
-    if as_json:
-        print_json({"index": index})
-    else:
-        print(f"Leaderboard: {index}")
+    _tell(as_json, {"index": index}, f"Leaderboard: {index}")
 
 
 @leaderboard.command()
@@ -283,15 +273,20 @@ def add(
             raise ValueError(f"{path} is larger than evidence can be")
         found.append(parse_map(path.read_bytes(), str(path)))
     folder = submission.add(valid, found, submissions, name, address)
+    told = {"submission": folder, "evidence": valid.evidence}
+    _tell(as_json, told, f"Submission: {folder}")
+
+
+def _tell(as_json: bool, found: object, text: str) -> None:
+    """What a command found, as JSON or in words."""
     if as_json:
-        print_json({"submission": folder, "evidence": valid.evidence})
+        print_json(found)
     else:
-        print(f"Submission: {folder}")
+        print(text)
 
 
 def scene_progress() -> Callable[[int, int], None]:
     """A function that says on stderr how many scenes of a large bundle were made again."""
-
     tenths = 0
 
     def show(count: int, trials: int) -> None:
@@ -307,7 +302,6 @@ def _replay(
     valid: Valid, challenge: str, fraction: float, workers: int, reference: rules.Reference
 ) -> replay.SampleReplay:
     """Replay a sample of the trials, with a progress bar."""
-
     count = evidence.sample_size(fraction, len(valid.keys))
     with Progress(count) as progress:
 
@@ -322,5 +316,4 @@ def _replay(
 
 
 def _write(path: Path, found: Mapping[str, object]) -> None:
-
     replace_file(path, (json.dumps(found, indent=1) + "\n").encode())

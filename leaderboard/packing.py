@@ -29,13 +29,7 @@ from robospa.leaderboard.evidence import announced
 from robospa.leaderboard.rules import Done, Reference
 from robospa.leaderboard.traces import Trace, encode, with_joints
 from robospa.leaderboard.trial_rows import TrialRow, trace_hash, write_rows
-from robospa.leaderboard.verify import (
-    Valid,
-    check_run,
-    outcomes_of,
-    scores_of,
-    verify,
-)
+from robospa.leaderboard.verify import Valid, check_run, outcomes_of, scores_of, verify
 from robospa.results.records.manifest import PolicySettings, RunAbout, make_manifest
 from robospa.results.records.runs import Run, action_path, by_setting, read_run
 from robospa.results.records.trial_record import TrialRecord

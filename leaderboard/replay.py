@@ -25,12 +25,7 @@ from robospa.harness.running.manifest import about_machine, changed_settings, th
 from robospa.harness.trial import FINAL
 from robospa.harness.worlds import open_world
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.evidence import (
-    APART,
-    ReplayEvidence,
-    drawn,
-    what_it_catches,
-)
+from robospa.leaderboard.evidence import APART, ReplayEvidence, drawn, what_it_catches
 from robospa.leaderboard.rules import Reference, spec_of
 from robospa.leaderboard.traces import Trace, split_trace
 from robospa.leaderboard.verify import Valid, read_traces

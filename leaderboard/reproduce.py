@@ -94,7 +94,8 @@ def draw_block(
             while len(found) < count:
                 if tried > 2 * count + 10:
                     raise BundleError(f"the expert does not solve {task} level {level}")
-                wanted = [_fresh() for _ in range(count - len(found))]
+                lacking = range(count - len(found))
+                wanted = [FIRST + secrets.randbelow(LAST - FIRST) for _ in lacking]
                 tried += len(wanted)
                 key = ListKey(task, level, embodiment, mode)
                 futures = [pool.submit((key, seed)) for seed in wanted]
@@ -103,10 +104,6 @@ def draw_block(
             seeds[f"{task}/{level}"] = tuple(sorted(set(found)))
             note(f"{task} level {level}: {len(found)} of {tried} seeds accepted")
     return Block(seeds, salt)
-
-
-def _fresh() -> int:
-    return FIRST + secrets.randbelow(LAST - FIRST)
 
 
 def write_block(block: Block, path: Path) -> None:
@@ -154,9 +151,7 @@ def claims_of(valid: Valid, metric: str = RANKED) -> dict[str, agreement.Counts]
     found: dict[str, list[bool]] = {}
     for key, record in valid.run.records.items():
         found.setdefault(f"{key.task}/{key.level}", []).append(COUNTED[metric](record))
-    return {
-        variant: agreement.Counts(sum(made), len(made), 0, 0) for variant, made in found.items()
-    }
+    return {name: agreement.Counts(sum(made), len(made), 0, 0) for name, made in found.items()}
 
 
 def plan(valid: Valid, trials: int | None, alpha: float = 0.01) -> int:

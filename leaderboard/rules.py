@@ -134,7 +134,7 @@ def manifest_of(data: object, what: str = "the run") -> RunManifest:
 
 def spec_of(settings: RunSettings, task: str) -> PolicySpecification:
     """The specification of the policy that did `task`; BundleError if the settings hold none."""
-    policy = settings.policy_of(task)
+    policy = settings.policies.get(task) if settings.policies else settings.policy
     if policy is None:
         raise BundleError(f"the run's settings hold no policy spec for {task}")
     return policy.stated
@@ -265,12 +265,6 @@ def _listed(reference: Reference, task: str, level: int, robot: str, mode: str) 
         return bool(reference.seeds(task, level, robot, mode))
     except LookupError:
         return False
-
-
-def check_categories(run: RunManifest, tasks: Sequence[str], reference: Reference) -> None:
-    """BundleError unless the run says the category of each of its tasks, and says it right."""
-    if run.categories != {t: reference.facts(t, LEVELS[0]).category for t in tasks}:
-        raise BundleError("the run's categories are not those of its tasks")
 
 
 FEW = 500

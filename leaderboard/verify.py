@@ -85,7 +85,9 @@ def verify(
         claimed = rules.manifest_of(said := archive.read_map(layout.RUN))
         if where := compare_scores(claimed.to_json(), said):
             raise BundleError(f"{layout.RUN} says what no run says: {where}")
-        keys = _keys(claimed, archive.limits)
+        if sum(len(group.seeds) for group in claimed.trials) > archive.limits.rows:
+            raise BundleError(f"the run lists more than {archive.limits.rows} trials")
+        keys = tuple(sorted(claimed.keys))
         if claimed.seed_hash != seed_hash(keys):
             raise BundleError("the run's hash of its list of trials is another")
         if manifest.inputs != layout.inputs_hash(claimed):
@@ -139,7 +141,8 @@ def check_listed(
     rules.check_seeds(keys, reference, practice)
     tasks = list(dict.fromkeys(key.task for key in keys))
     check_checkpoints(card, tasks)
-    rules.check_categories(run, tasks, reference)
+    if run.categories != {t: reference.facts(t, rules.LEVELS[0]).category for t in tasks}:
+        raise BundleError("the run's categories are not those of its tasks")
     for task in tasks:
         rules.check_card_fits(card, settings, task)
 
@@ -200,13 +203,6 @@ def _check_files(archive: layout.BundleArchive, listed: Mapping[str, layout.File
     for name in needed:
         if name not in listed:
             raise BundleError(f"the bundle has no {name}")
-
-
-def _keys(run: RunManifest, limits: layout.BundleLimits) -> tuple[TrialKey, ...]:
-    """The listed trials, by task, level and seed."""
-    if sum(len(group.seeds) for group in run.trials) > limits.rows:
-        raise BundleError(f"the run lists more than {limits.rows} trials")
-    return tuple(sorted(run.keys))
 
 
 def _records(
@@ -357,8 +353,7 @@ def compare_scores(right: object, given: object, where: str = "") -> str:
     else:
         return "" if _equal(right, given) else f"{where} is {str(given)[:40]!a}, not {right!r}"
     for name, one, other in pairs:
-        found = compare_scores(one, other, f"{where}, {name}" if where else str(name))
-        if found:
+        if found := compare_scores(one, other, f"{where}, {name}" if where else str(name)):
             return found
     return ""
 

@@ -50,25 +50,21 @@ class CallCost:
     """Duration of a call of n observations [s]: a straight line through recent calls."""
 
     weight: float = 0.0
-    n: float = 0.0
-    d: float = 0.0
-    nn: float = 0.0
-    nd: float = 0.0
+    sums: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    """Weighted sums of sizes, of seconds, of sizes squared and of sizes times seconds."""
 
     def add(self, size: int, seconds: float) -> None:
         self.weight = DECAY * self.weight + 1.0
-        self.n = DECAY * self.n + size
-        self.d = DECAY * self.d + seconds
-        self.nn = DECAY * self.nn + size * size
-        self.nd = DECAY * self.nd + size * seconds
+        new = (size, seconds, size * size, size * seconds)
+        self.sums = tuple(DECAY * old + one for old, one in zip(self.sums, new, strict=True))
 
     def __call__(self, size: float) -> float:
         """Seconds for `size` observations; the mean while all calls were of one size."""
-        mean, seconds = self.n / self.weight, self.d / self.weight
-        variance = self.nn / self.weight - mean * mean
+        mean, seconds, squares, products = (total / self.weight for total in self.sums)
+        variance = squares - mean * mean
         if variance < 0.05:
             return seconds
-        slope = (self.nd / self.weight - mean * seconds) / variance
+        slope = (products - mean * seconds) / variance
         return seconds + min(max(slope, 0.0), seconds / mean) * (size - mean)
 
 
@@ -135,7 +131,8 @@ class AdaptiveBatchWindow:
         # Their sum is the expected number of arrivals by then.
         more = np.cumsum(chance)
         batch = np.minimum(k + more, size)
-        rates = batch / (due + self._costs(batch))
+        low, high = self.cost(1.0), self.cost(2.0)
+        rates = batch / (due + (low + (high - low) * (batch - 1.0)))
         meanwhile = float(min(more[-1], size))
         served = [k / alone, (k + meanwhile) / (alone + self.cost(meanwhile))]
         best = int(np.argmax(rates))
@@ -161,10 +158,6 @@ class AdaptiveBatchWindow:
                 found += [(wait, 1 / (len(later) + 1)) for wait in later]
         table = np.array(sorted(f for f in found if f[0] <= limit)).reshape(-1, 2)
         return table[:, 0], table[:, 1]
-
-    def _costs(self, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
-        low, high = self.cost(1.0), self.cost(2.0)
-        return low + (high - low) * (sizes - 1.0)
 
 
 BatchCall = Callable[[Sequence[Observation], Sequence[int]], Awaitable[Sequence[object]]]

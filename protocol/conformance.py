@@ -33,14 +33,7 @@ from robospa.protocol.messages import (
     pack,
     unpack,
 )
-from robospa.protocol.policy import (
-    CALLED,
-    PolicyAnswer,
-    PolicySpec,
-    TrialInfo,
-    joints_of,
-    robot_of,
-)
+from robospa.protocol.policy import CALLED, PolicyAnswer, PolicySpec, TrialInfo, joints_of, robot_of
 from robospa.protocol.transport import Address, Timeouts, Transport
 from robospa.text import counted
 from robospa.trial import REFERENCE, TrialKey

@@ -20,13 +20,7 @@ from numpy.typing import NDArray
 
 from robospa.protocol.codec import DEFAULT_LIMITS, Buffer, Limits, decode, encode
 from robospa.protocol.errors import DecodeError, VersionMismatch
-from robospa.protocol.policy import (
-    PolicySpec,
-    TrialInfo,
-    Whole,
-    check_printable,
-    check_spec,
-)
+from robospa.protocol.policy import PolicySpec, TrialInfo, Whole, check_printable, check_spec
 from robospa.schema import describe, read
 
 VERSION = "1.1"

@@ -33,11 +33,7 @@ from robospa.protocol import errors, messages
 from robospa.protocol.batching import QueueFull
 from robospa.protocol.calls import check_calls
 from robospa.protocol.codec import Limits, decode, decode_images
-from robospa.protocol.connection_limits import (
-    ConnectionLimiter,
-    MonitoredConnection,
-    ServerOptions,
-)
+from robospa.protocol.connection_limits import ConnectionLimiter, MonitoredConnection, ServerOptions
 from robospa.protocol.messages import SUBPROTOCOL, Error, Message
 from robospa.protocol.openpi import serve_openpi
 from robospa.protocol.policy import CALLED, Policy, PolicySpec, check_chunk, check_observation

@@ -84,11 +84,7 @@ class Address:
 
 
 class _Redirected(Exception):
-    """The server sends this client to `location`."""
-
-    def __init__(self, location: str) -> None:
-        super().__init__(location)
-        self.location = location
+    """The server sends this client to the address that is the error's text."""
 
 
 class _Connection(ClientConnection):
@@ -282,7 +278,7 @@ def _open(
         try:
             return connect_until(here.url, timeouts.wait, attempt), here.url
         except _Redirected as error:
-            address = _moved(here, error.location)
+            address = _moved(here, str(error))
     raise errors.HandshakeError(f"{here.url} redirects for ever")
 
 
@@ -309,12 +305,8 @@ def _attempt(
             refuse_tls(address.url, error)
         if not _hung_up(error):
             raise errors.ConnectFailed(connect_failure(address.url, error)) from error
-        raise NotYet(
-            errors.ConnectFailed(
-                f"cannot connect to {address.url}: it hung up during the handshake ({error}); "
-                "start the policy server behind it"
-            )
-        ) from error
+        text = f"cannot connect to {address.url}: it hung up during the handshake ({error}); "
+        raise NotYet(errors.ConnectFailed(text + "start the policy server behind it")) from error
 
 
 def _moved(address: Address, location: str) -> Address:

@@ -17,16 +17,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct, to_builtins
 
-from robospa.schema import (
-    MAX_INTEGER,
-    Count,
-    Name,
-    Number,
-    SettingName,
-    parse_json,
-    pattern,
-    read,
-)
+from robospa.schema import MAX_INTEGER, Count, Name, Number, SettingName, parse_json, pattern, read
 from robospa.trial import TrialKey
 
 MANIFEST = "run.json"
@@ -168,10 +159,6 @@ class RunSettings(Struct, frozen=True):
     def stated(self) -> list[PolicySpecification]:
         """What all policies said of themselves."""
         return [policy.stated for policy in (self.policy, *self.policies.values())]
-
-    def policy_of(self, task: str) -> PolicySettings | None:
-        """The policy that does `task`; None if there are policies by task, and none for it."""
-        return self.policies.get(task) if self.policies else self.policy
 
 
 class ServerIdentity(Struct, frozen=True):

@@ -20,12 +20,7 @@ from robospa.results.paper.rounding import OVERALL
 from robospa.results.records.runs import Run, finished
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.first_choice import first_choice, held_at_start
-from robospa.results.statistics.intervals import (
-    METHODS,
-    Estimate,
-    interval_of,
-    mean,
-)
+from robospa.results.statistics.intervals import METHODS, Estimate, interval_of, mean
 from robospa.results.statistics.samples import Sample, onta_of_bound, progress, rate
 from robospa.trial import (
     BASIC,
