@@ -108,9 +108,7 @@ class StateEncoding:
     def state(self, query: Query, space: str | None = None) -> NDArray[np.float32]:
         """The state in `space` (that of the actions unless given), float32 (D,), (16,), (20,)."""
         space, last = space or self.space, None
-        if (
-            space == self.space and self.proprio != "measured"
-        ):  # the action just executed stands for it
+        if space == self.space and self.proprio != "measured":  # the last command stands for it
             done = int(query.observation["step"]) - int(query.memory.get("asked_at", 0))
             last = last_executed(query.memory.get("chunk"), done)
         if space == "joint":
