@@ -88,11 +88,8 @@ class LoadedRun(Run):
         pandas, which the extra `notebook` brings.
         """
         frame = need("pandas").DataFrame(trial_columns(self))
-        kinds = dict.fromkeys(FLAGS, "boolean") | dict.fromkeys(
-            (*COUNTS, *PROBLEMS, *CHOICES), "Int64"
-        )
-        kinds |= dict.fromkeys(NUMBERS, "float64")
-        return frame.astype(kinds)
+        kinds = dict.fromkeys(FLAGS, "boolean") | dict.fromkeys(NUMBERS, "float64")
+        return frame.astype(kinds | dict.fromkeys((*COUNTS, *PROBLEMS, *CHOICES), "Int64"))
 
     def to_csv(self, path: str | Path) -> None:
         """Write the rows of `to_pandas` as CSV to the file `path`."""
@@ -195,14 +192,8 @@ def trial_columns(run: Run) -> dict[str, list[Cell]]:
         name: [getattr(key, name) for key in run.keys] for name in KEY_COLUMNS
     }
     columns["end"] = [NOT_RUN if record is None else record.end for record in known]
-    fields: dict[str, Callable[[TrialRecord], Cell]] = {
-        **FLAGS,
-        **{name: attrgetter(name) for name in COUNTS},
-        **PROBLEMS,
-        **CHOICES,
-        **NUMBERS,
-        **TEXTS,
-    }
+    counts: dict[str, Callable[[TrialRecord], Cell]] = {n: attrgetter(n) for n in COUNTS}
+    fields = {**FLAGS, **counts, **PROBLEMS, **CHOICES, **NUMBERS, **TEXTS}
     for name, value in fields.items():
         columns[name] = [None if record is None else value(record) for record in records]
     return columns

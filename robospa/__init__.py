@@ -21,11 +21,8 @@ if TYPE_CHECKING:
     from robospa.harness.datasets.collect import collect as collect
     from robospa.harness.running.api import evaluate as evaluate
     from robospa.harness.settings import EvaluationSettings as EvaluationSettings
-    from robospa.observation import CameraSpec as CameraSpec
-    from robospa.observation import Observation as Observation
-    from robospa.protocol.policy import Policy as Policy
-    from robospa.protocol.policy import PolicySpec as PolicySpec
-    from robospa.protocol.policy import TrialInfo as TrialInfo
+    from robospa.observation import CameraSpec, Observation
+    from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
     from robospa.protocol.server import serve as serve
     from robospa.results.comparison.compare import compare as compare
     from robospa.results.records.trial_record import TrialRecord as TrialRecord

@@ -181,16 +181,9 @@ def matrix_to_quaternion(matrix: Array) -> Array:
     four[..., 1, 1] = 1 + r00 - r11 - r22
     four[..., 2, 2] = 1 - r00 + r11 - r22
     four[..., 3, 3] = 1 - r00 - r11 + r22
-    pairs = {
-        (0, 1): m[..., 2, 1] - m[..., 1, 2],
-        (0, 2): m[..., 0, 2] - m[..., 2, 0],
-        (0, 3): m[..., 1, 0] - m[..., 0, 1],
-        (1, 2): m[..., 1, 0] + m[..., 0, 1],
-        (1, 3): m[..., 0, 2] + m[..., 2, 0],
-        (2, 3): m[..., 2, 1] + m[..., 1, 2],
-    }
-    for (i, j), value in pairs.items():
-        four[..., i, j] = four[..., j, i] = value
+    four[..., 0, 1:] = four[..., 1:, 0] = turning_vector(m)
+    for i, j in ((1, 2), (1, 3), (2, 3)):
+        four[..., i, j] = four[..., j, i] = m[..., i - 1, j - 1] + m[..., j - 1, i - 1]
     best = np.argmax(np.diagonal(four, axis1=-2, axis2=-1), axis=-1)
     row = np.take_along_axis(four, best[..., None, None], axis=-2)[..., 0, :]
     unit = row / np.linalg.norm(row, axis=-1, keepdims=True)
@@ -218,12 +211,5 @@ def angle_between(a: Array, b: Array) -> Array:
 
 def turning_vector(matrix: Array) -> Array:
     """(..., 3): the axis of a rotation (..., 3, 3) times twice the sine of its angle."""
-    m = matrix
-    return np.stack(
-        [
-            m[..., 2, 1] - m[..., 1, 2],
-            m[..., 0, 2] - m[..., 2, 0],
-            m[..., 1, 0] - m[..., 0, 1],
-        ],
-        axis=-1,
-    )
+    parts = [matrix[..., i, j] - matrix[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0))]
+    return np.stack(parts, axis=-1)

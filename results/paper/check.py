@@ -155,10 +155,8 @@ def _per_task(data: Published) -> Iterator[Check]:
                 success = data.value(model, "sr", task, level) or 0.0
                 count, reason, digits = about.counts[level - 1], "", 1
                 if metric == "sr":
-                    ours, digits = (
-                        rounded(round(printed_value * data.trials / 100) / data.trials * 100),
-                        0,
-                    )
+                    share = round(printed_value * data.trials / 100) / data.trials
+                    ours, digits = rounded(share * 100), 0
                 elif metric == "onta":
                     ours = rounded(onta_of_percent(success, count))
                     fits = [
@@ -226,9 +224,7 @@ def _counts(data: Published) -> Iterator[Check]:
             data.budget_source, "model sizes", model, model, "GPU hours", row.gpu_hours, hours
         )
     assets = data.assets
-    for name, ours in (
-        ("categories", len(assets.rows)),
-        ("variants", sum(assets.rows.values())),
-    ):
+    totals = {"categories": len(assets.rows), "variants": sum(assets.rows.values())}
+    for name, ours in totals.items():
         printed_value = assets.text[name]
         yield Check(assets.source, "assets", "total", "", name, printed_value, ours, digits=0)

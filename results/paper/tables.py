@@ -185,9 +185,7 @@ def models_table() -> Table:
             title(model),
             (
                 TableCell(row.parameters),
-                TableCell(str(row.gpus), row.gpus),
-                TableCell(f"{row.hours:g}", row.hours),
-                TableCell(f"{row.gpu_hours:g}", row.gpu_hours),
+                *(TableCell(f"{n:g}", n) for n in (row.gpus, row.hours, row.gpu_hours)),
             ),
         )
         for model, row in load().models.items()
@@ -321,14 +319,11 @@ def like_paper(columns: Sequence[Column]) -> list[Column]:
 def write_tables(tables: Sequence[Table], folder: Path, formats: Sequence[str]) -> list[Path]:
     """Write `tables.<ending>` with all of `tables`; for LaTeX also one file each, to be input."""
     folder.mkdir(parents=True, exist_ok=True)
-    written = []
+    files: dict[str, str] = {}
     for ending in formats:
-        path = folder / f"tables.{ending}"
-        path.write_text(FORMATS[ending](tables), encoding="utf-8")
-        written.append(path)
+        files[f"tables.{ending}"] = FORMATS[ending](tables)
         if ending == "tex":
-            for table in tables:
-                path = folder / f"{table.name}.tex"
-                path.write_text(to_latex(table), encoding="utf-8")
-                written.append(path)
-    return written
+            files |= {f"{table.name}.tex": to_latex(table) for table in tables}
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    return [folder / name for name in files]

@@ -308,10 +308,8 @@ def is_locked(handle: int) -> bool:
     """Whether another process holds an open file for itself; False where locks do not tell."""
     try:
         fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    except OSError:  # a file system without locks
-        return False
+    except OSError as error:  # any other: a file system without locks
+        return isinstance(error, BlockingIOError)
     return False
 
 

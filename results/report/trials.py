@@ -38,17 +38,8 @@ def trial_rows(
     pairs = [(number, run, key) for number, run in enumerate(runs) for key in run.keys]
     if len(pairs) > SHOWN_TRIALS:
         pairs = sorted(pairs, key=lambda p: _succeeded(p[1], p[2]))[:SHOWN_TRIALS]
-    return [
-        _row(
-            number,
-            run,
-            key,
-            folder,
-            failures[number].get(key),
-            len({run.folder for run in runs}) > 1,
-        )
-        for number, run, key in pairs
-    ]
+    several = len({run.folder for run in runs}) > 1
+    return [_row(n, run, key, folder, failures[n].get(key), several) for n, run, key in pairs]
 
 
 def _succeeded(run: Run, key: TrialKey) -> bool:
@@ -84,11 +75,8 @@ def _row(
         "film": film_state(run, record) if video is None else "",
     }
     if failure is not None:
-        row |= {
-            "failure": failure.kind,
-            "why": described(failure.evidence, record),
-            "at": failure.time,
-        }
+        why = described(failure.evidence, record)
+        row |= {"failure": failure.kind, "why": why, "at": failure.time}
     return {name: value for name, value in row.items() if value not in ("", None, [])}
 
 
@@ -98,10 +86,10 @@ def pair_rows(
     """Axis and both trials, as in `trial_rows`, of `pairs` of profiles whose clean trials are among
     `runs`."""
     places = [run.folder for run in runs]
+    several = len(set(places)) > 1
     made: list[dict[str, object]] = []
     for run, axis, pair in pairs:
         where = places.index(run.folder), run
-        several = len(set(places)) > 1
         rows = [_row(*where, r.key, folder, label(r), several) for r in pair]
         made.append({"axis": axis, "trials": rows})
     return made

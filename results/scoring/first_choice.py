@@ -28,9 +28,7 @@ def first_choice(record: TrialRecord) -> bool:
     Spatial tasks and basic grounding: no other object rose, was lifted, or had a gripper close on
     it. Procedures and memory: nothing was done that was not asked for, too early, or once more.
     """
-    if not record.success:
-        return False
-    if took_another(record):
+    if not record.success or took_another(record):
         return False
     if record.category in (*SPATIAL, *BASIC):
         return True

@@ -38,11 +38,8 @@ def used(record: TrialRecord) -> dict[str, float]:
 def total(records: Iterable[TrialRecord]) -> dict[str, float]:
     """The sums over `records`, and `trials`: how many of them report any; empty for none."""
     rows = [found for record in records if (found := used(record))]
-    return (
-        {"trials": len(rows), **{n: sum(row.get(n, 0) for row in rows) for n in COLUMNS}}
-        if rows
-        else {}
-    )
+    sums = {n: sum(row.get(n, 0) for row in rows) for n in COLUMNS}
+    return {"trials": len(rows), **sums} if rows else {}
 
 
 def usage_table(models: Sequence[ModelResults]) -> Table | None:
