@@ -83,6 +83,9 @@ def write_site(entries: Sequence[Entry], out: Path, note: Note = lambda text: No
 
 def index_page(entries: Sequence[Entry]) -> str:
     """The leaderboard itself."""
+    # how many standard errors a lead needs among 1, 2, ... comparisons (Bonferroni)
+    most, normal = min(COMPARISONS, max(100, len(entries))), NormalDist()
+    critical = [round(normal.inv_cdf(1 - 0.025 / many), 4) for many in range(1, most + 1)]
     return render(
         "site.html",
         title="RoboSPA leaderboard",
@@ -104,15 +107,9 @@ def index_page(entries: Sequence[Entry]) -> str:
             "training": TRAINING,
             "metrics": METRIC_NAMES,
             "pairs": [f"{one.slug}/{two.slug}" for one, two in pairs_of(entries)],
-            "critical": critical_values(min(COMPARISONS, max(100, len(entries)))),
+            "critical": critical,
         },
     )
-
-
-def critical_values(most: int) -> list[float]:
-    """How many standard errors a lead needs among 1, 2, ... `most` comparisons (Bonferroni)."""
-    normal = NormalDist()
-    return [round(normal.inv_cdf(1 - 0.025 / many), 4) for many in range(1, most + 1)]
 
 
 def row_data() -> dict[str, dict[str, str]]:

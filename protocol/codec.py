@@ -148,18 +148,7 @@ def decode(
     return value
 
 
-_FIXED = {
-    0xCA: struct.Struct(">f"),
-    0xCB: struct.Struct(">d"),
-    0xCC: struct.Struct(">B"),
-    0xCD: struct.Struct(">H"),
-    0xCE: struct.Struct(">I"),
-    0xCF: struct.Struct(">Q"),
-    0xD0: struct.Struct(">b"),
-    0xD1: struct.Struct(">h"),
-    0xD2: struct.Struct(">i"),
-    0xD3: struct.Struct(">q"),
-}
+_FIXED = {tag: struct.Struct(f">{form}") for tag, form in enumerate("fdBHIQbhiq", 0xCA)}
 _LENGTHS = {1: struct.Struct(">B"), 2: struct.Struct(">H"), 4: struct.Struct(">I")}
 _CONSTANTS = {0xC0: None, 0xC2: False, 0xC3: True}
 _BIN = {0xC4: 1, 0xC5: 2, 0xC6: 4}

@@ -64,15 +64,11 @@ def check_ranges(options: object) -> None:
         value = getattr(options, name)
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             continue
-        bounds = next((m for k in _alternatives(hint) for m in _meta(k)), msgspec.Meta())
+        rules = [rule for kind in _alternatives(hint) for rule in getattr(kind, "__metadata__", ())]
+        bounds = next((r for r in rules if isinstance(r, msgspec.Meta)), msgspec.Meta())
         finite = isinstance(value, int) or math.isfinite(value)
         if not (finite and _within(value, bounds)):
             raise ValueError(f"{name} is {str(value)[:40]}, and must be {_range(bounds)}")
-
-
-def _meta(hint: Any) -> list[msgspec.Meta]:
-    """The rules that an annotation has."""
-    return [rule for rule in getattr(hint, "__metadata__", ()) if isinstance(rule, msgspec.Meta)]
 
 
 def _within(value: float, bounds: msgspec.Meta) -> bool:
@@ -85,13 +81,10 @@ def _within(value: float, bounds: msgspec.Meta) -> bool:
 
 def _range(bounds: msgspec.Meta) -> str:
     """Bounds in words."""
+    limits = {"at least": bounds.ge, "more than": bounds.gt, "at most": bounds.le}
     words = [
         f"{word} {limit:g}" if limit < 1e6 else f"{word} {limit}"
-        for word, limit in (
-            ("at least", bounds.ge),
-            ("more than", bounds.gt),
-            ("at most", bounds.le),
-        )
+        for word, limit in limits.items()
         if limit is not None
     ]
     return " and ".join(words) or "a finite number"

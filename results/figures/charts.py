@@ -176,7 +176,10 @@ def draw_heat(series: Series) -> Figure:
         range(len(tasks)), [label_of(t.replace("_", " "), 40) for t in tasks], fontsize=5.5
     )
     axis.set_xticks(range(len(levels)), [f"L{n}" for n in levels])
-    _cell_borders(axis, len(tasks), len(levels))
+    # thin lines between the cells, so that equal ones do not run together
+    axis.set_yticks([n + 0.5 for n in range(len(tasks) - 1)], minor=True)
+    axis.set_xticks([n + 0.5 for n in range(len(levels) - 1)], minor=True)
+    axis.grid(which="minor", color=GRID, lw=0.5)
     axis.tick_params(which="both", length=0)
     axis.xaxis.tick_top()
     axis.spines[:].set_visible(False)
@@ -187,13 +190,6 @@ def draw_heat(series: Series) -> Figure:
     bar.set_label("SR [%]")
     bar.outline.set_visible(False)
     return figure
-
-
-def _cell_borders(axis: Axes, lines: int, columns: int) -> None:
-    """Thin lines between the cells, so that equal ones do not run together."""
-    axis.set_yticks([n + 0.5 for n in range(lines - 1)], minor=True)
-    axis.set_xticks([n + 0.5 for n in range(columns - 1)], minor=True)
-    axis.grid(which="minor", color=GRID, lw=0.5)
 
 
 def _heat_number(axis: Axes, line: int, column: int, value: float) -> None:
@@ -331,11 +327,6 @@ def draw_failures(
 
 
 MEASURES = (("p50", "-"), ("p95", "--"), ("p99", ":"))
-
-
-def has_latency(series: Series) -> bool:
-    """Whether any trial measured its policy's latency."""
-    return any(r.latency.get("p50", 0) > 0 for r in series.records)
 
 
 def draw_latency(all_series: Sequence[Series]) -> Figure:

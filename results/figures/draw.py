@@ -48,7 +48,7 @@ def draw(
     sizes = [len(s.scores.cells) for s in together]
     cut = sizes != [len(s.scores.cells) for s in compared]
     over = f" Over the {sizes[0]} variants that all have." if cut else ""
-    runs = [s for s in all_series if charts.has_latency(s)]
+    runs = [s for s in all_series if any(r.latency.get("p50", 0) > 0 for r in s.records)]
     mapped = [s for s in all_series if not s.published] or all_series
     with styled():
         if any(s.scores.categories for s in together):
