@@ -67,8 +67,7 @@ class Group:
 
 def group(entry: Entry) -> Group | None:
     """The group of `entry`; None if it does not state all parts, so that it is in nobody's."""
-    found = Group(entry.suite, entry.embodiment, entry.mode, entry.split, entry.track)
-    return found if all(astuple(found)) else None
+    return entry.setting if all(astuple(entry.setting)) else None
 
 
 def ranks(entry: Entry) -> tuple[str, ...]:
@@ -142,10 +141,6 @@ class Entry:
     parameters: str
     link: str
     badges: tuple[str, ...]
-    embodiment: str
-    mode: str
-    split: str
-    suite: str
     training: str
     scenes: str
     column: Column
@@ -157,9 +152,11 @@ class Entry:
     """"ROW/LEVEL" where hidden scenes would have shown a lie."""
 
     @property
-    def track(self) -> str:
-        """What it answers in, beside which nothing of another track is ranked."""
-        return ", ".join(self.column.results.setting.track)
+    def setting(self) -> Group:
+        """What it was measured in; what is not stated is empty."""
+        found = self.column.results.setting
+        parts = (found.suite, found.embodiment, found.mode, found.split, found.track)
+        return Group(*map(", ".join, parts))
 
     @property
     def badge(self) -> str:
@@ -187,10 +184,6 @@ def published_entries() -> list[Entry]:
                 parameters=parameters,
                 link="",
                 badges=("published",),
-                embodiment=data.embodiment,
-                mode=data.mode,
-                split=data.split,
-                suite=data.suite,
                 training="single",
                 scenes=UNKNOWN,
                 column=column,
@@ -232,10 +225,6 @@ def entry_of(submission: Submission) -> Entry:
         parameters=short_count(card.parameters),
         link="" if recipe_of(card.link) else card.link,
         badges=evidence.badges,
-        embodiment=column.embodiment,
-        mode=run.settings.mode[0],
-        split=run.settings.split[0],
-        suite=run.suite,
         training=training.tasks,
         scenes=training.scenes,
         column=column,

@@ -123,6 +123,7 @@ def row_data() -> dict[str, dict[str, str]]:
 
 def model_data(entry: Entry) -> dict[str, object]:
     """An entry for the table's script; see `ranks`."""
+    setting = entry.setting
     return {
         "id": entry.slug,
         "name": entry.name,
@@ -131,11 +132,11 @@ def model_data(entry: Entry) -> dict[str, object]:
         "badges": list(entry.badges),
         "group": str(group(entry) or ""),
         "ranks": _by_row(ranks(entry)),
-        "embodiment": entry.embodiment,
-        "mode": entry.mode,
-        "split": entry.split,
-        "suite": entry.suite,
-        "track": entry.track,
+        "embodiment": setting.embodiment,
+        "mode": setting.mode,
+        "split": setting.split,
+        "suite": setting.suite,
+        "track": setting.track,
         "training": entry.training,
         "scenes": entry.scenes,
         "parameters": entry.parameters,
@@ -165,7 +166,9 @@ def suites(entries: Sequence[Entry]) -> list[dict[str, object]]:
     """The history of the suite, newest first, with the number of models on each."""
     text = files("robospa.leaderboard").joinpath("suites.json").read_text(encoding="utf-8")
     known: list[dict[str, object]] = json.loads(text)
-    made = [{**s, "models": sum(e.suite == s["name"] for e in entries)} for s in reversed(known)]
+    made = [
+        {**s, "models": sum(e.setting.suite == s["name"] for e in entries)} for s in reversed(known)
+    ]
     published = sum("published" in e.badges for e in entries)
     origin = "The paper's own scenes and seeds, which are not published as a suite."
     return [*made, {"name": "paper", "robospa": "–", "models": published, "text": origin}]

@@ -95,9 +95,6 @@ def _random_entry(model: Entry, number: int) -> Entry:
         name=name,
         team=f"Team {number % 7}",
         badges=("valid", *("replayed",) * (number % 2), "reproduced"),
-        mode=mode,
-        split="heldout",
-        suite="robospa-1",
         column=column,
         cells=tuple(f"{row}/{n}" for row in page_values(model)["sr"] for n in (0, *LEVELS)),
     )

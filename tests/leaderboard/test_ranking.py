@@ -45,6 +45,12 @@ def entries() -> list[Entry]:
     return many_entries(6)
 
 
+def measured_in(entry: Entry, **parts: tuple[str, ...]) -> Entry:
+    results = entry.column.results
+    changed = replace(results, setting=replace(results.setting, **parts))
+    return replace(entry, column=replace(entry.column, results=changed))
+
+
 def test_who_was_not_reproduced_on_hidden_scenes_is_a_claim(entries: list[Entry]) -> None:
     entry = replace(entries[5], cells=())
     assert group(entry) and not model_data(entry)["ranks"]
@@ -52,7 +58,7 @@ def test_who_was_not_reproduced_on_hidden_scenes_is_a_claim(entries: list[Entry]
 
 def test_the_page_is_given_groups_and_who_is_ranked(entries: list[Entry]) -> None:
     """The page's script ranks by these two fields and by nothing else."""
-    made = [model_data(entry) for entry in (*entries[:5], replace(entries[5], split=""))]
+    made = [model_data(entry) for entry in (*entries[:5], measured_in(entries[5], split=()))]
     assert [(one["group"], bool(one["ranks"])) for one in made] == [
         *[(PAPER, False)] * 4,
         ("robospa-1, aloha-agilex, clean, heldout", True),
@@ -77,21 +83,14 @@ def test_the_page_shows_one_part_for_each_group_the_papers_last(entries: list[En
 
 @pytest.mark.parametrize("part", ["suite", "embodiment", "mode", "split"])
 def test_what_is_not_stated_equals_nothing(part: str) -> None:
-    entry = replace(published_entries()[0], **{part: ""})
+    entry = measured_in(published_entries()[0], **{part: ()})
     assert group(entry) is None
     assert not ranks(entry)
 
 
 def test_skills_are_ranked_among_themselves_and_paired_with_no_joints(entries: list[Entry]) -> None:
-    def said_to_be(entry: Entry, track: str) -> Entry:
-        results = entry.column.results
-        setting = replace(results.setting, track=(track,))
-        return replace(
-            entry, column=replace(entry.column, results=replace(results, setting=setting))
-        )
-
     first, second = (entry for entry in entries[4:7:2])
-    skills = said_to_be(second, "skills")
+    skills = measured_in(second, track=("skills",))
     assert group(first) == group(second) != group(skills) and ranks(skills)
     shown = [model_data(one)["group"] for one in (first, skills)]
     assert shown[1] == f"{shown[0]}, skills"
@@ -100,7 +99,7 @@ def test_skills_are_ranked_among_themselves_and_paired_with_no_joints(entries: l
 
 
 def test_nobody_is_ranked_in_a_suite_that_still_changes(entries: list[Entry]) -> None:
-    draft = replace(entries[-1], suite="robospa-3-draft")
+    draft = measured_in(entries[-1], suite=("robospa-3-draft",))
     found = group(draft)
     assert not ranks(draft)
     assert found is not None and "draft" in found.note
