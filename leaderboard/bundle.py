@@ -49,10 +49,7 @@ KINDS: tuple[tuple[re.Pattern[str], int], ...] = (
     (re.compile(r"report/(scores|outcomes)\.json"), 2 * MEGA),
     (re.compile(r"records\.jsonl"), 192 * MEGA),
     (re.compile(rf"actions/{_TASK}-L[1-5]\.bin"), 32 * MEGA),
-    (
-        re.compile(rf"videos/{_TASK}-L[1-5]-[0-9]{{1,20}}-{_SETTING}\.mp4"),
-        16 * MEGA,
-    ),
+    (re.compile(rf"videos/{_TASK}-L[1-5]-[0-9]{{1,20}}-{_SETTING}\.mp4"), 16 * MEGA),
 )
 """Every name that a bundle may hold, and the most bytes that such a file may have: several times
 what the whole benchmark needs. JSON takes up to 24 times its bytes in memory."""

@@ -134,13 +134,11 @@ def _problem(name: str) -> Callable[[TrialRecord], Cell]:
 
 
 def _failure(record: TrialRecord) -> str:
-    found = label(record)
-    return "" if found is None else NAMES[found.kind]
+    return NAMES[found.kind] if (found := label(record)) else ""
 
 
 def _evidence(record: TrialRecord) -> str:
-    found = label(record)
-    return "" if found is None else described(found.evidence, record)
+    return described(found.evidence, record) if (found := label(record)) else ""
 
 
 FLAGS: Mapping[str, Callable[[TrialRecord], Cell]] = {

@@ -140,8 +140,8 @@ class Column:
         if found is None or part is None or self.scores.ci != "bootstrap":
             return found
         below = part.samples.get(metric)
-        if below is None or isinstance(below, Sample):
-            return below if below is not None else found
+        if isinstance(below, Sample):
+            return below
         samples, weights = zip(*below, strict=True) if below else ((), ())
         return intervals.interval_of(samples, weights) if samples else found
 

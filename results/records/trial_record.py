@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Annotated, Any, TypedDict
+from typing import Annotated, Any, Required, TypedDict
 
 from robospa.schema import Count, Integer, Number, one_of
 from robospa.trial import TrialKey
@@ -44,14 +44,11 @@ RETRY_CAUSES = (
 """Why an attempt at a trial did not count. All but the first may be the policy's doing."""
 
 
-class _EventKind(TypedDict):
-    kind: str
-
-
-class EventRow(_EventKind, total=False):
+class EventRow(TypedDict, total=False):
     """An event (`robospa.tasks.events`) as plain values: `time` in seconds since the trial's start,
     `step` the number of actions begun by then."""
 
+    kind: Required[str]
     time: Number
     object: str
     index: Integer

@@ -143,24 +143,6 @@ def ends(run: Run) -> dict[str, int]:
     return dict(counts.most_common())
 
 
-def latency(run: Run) -> dict[str, float]:
-    """Milliseconds that the policy took to answer: median and largest of the trials' p50, p99.
-
-    Where its server reports them, also the means of `queue`, `infer` and of the size of a `batch`.
-    """
-    found = [r.latency for r in run.records.values() if r.latency]
-    if not found:
-        return {}
-    middle = sorted(x["p50"] for x in found)[len(found) // 2]
-    server = {
-        name: sum(values) / len(values)
-        for name in ("queue", "infer", "batch")
-        if (values := [x[name] for x in found if name in x])
-    }
-    worst = {name: max(x[name] for x in found) for name in ("p99", "max")}
-    return {"p50": middle, **worst, **server}
-
-
 def timing(run: Run) -> dict[str, float]:
     """Share of the trials' wall time by purpose."""
     total = sum(r.wall_time for r in run.records.values())
@@ -223,14 +205,23 @@ def _software(about: RunAbout) -> str:
 
 
 def _latency(run: Run) -> str:
-    spent = latency(run)
-    if not spent:
+    """How long the policy took to answer: the median of the trials' p50, the largest p99 and of
+    all; the means in its model and queue and of the size of a batch where its server tells them."""
+    found = [r.latency for r in run.records.values() if r.latency]
+    if not found:
         return ""
-    text = f"median {spent['p50']:.1f} ms, p99 {spent['p99']:.1f} ms, most {spent['max']:.1f} ms"
-    if "queue" in spent and "infer" in spent:
-        text += f"; {spent['infer']:.1f} ms in the model, {spent['queue']:.1f} ms in its queue"
-    if spent.get("batch", 1.0) > 1.0:
-        text += f"; {spent['batch']:.1f} observations a call"
+    middle = sorted(x["p50"] for x in found)[len(found) // 2]
+    p99, most = (max(x[name] for x in found) for name in ("p99", "max"))
+    means = {
+        name: sum(values) / len(values)
+        for name in ("queue", "infer", "batch")
+        if (values := [x[name] for x in found if name in x])
+    }
+    text = f"median {middle:.1f} ms, p99 {p99:.1f} ms, most {most:.1f} ms"
+    if "queue" in means and "infer" in means:
+        text += f"; {means['infer']:.1f} ms in the model, {means['queue']:.1f} ms in its queue"
+    if means.get("batch", 1.0) > 1.0:
+        text += f"; {means['batch']:.1f} observations a call"
     return text
 
 
