@@ -24,17 +24,11 @@ from robospa.results.records.runs import (
     setting_parts,
 )
 from robospa.results.records.trial_record import PROCESSOR
+from robospa.results.scoring import repeats
 from robospa.results.scoring.comparable import comparable_table
 from robospa.results.scoring.first_choice import after_others
 from robospa.results.scoring.grounding import grounding_table
 from robospa.results.scoring.models import ModelResults
-from robospa.results.scoring.repeats import (
-    error_rates_text,
-    policy_error_lines,
-    policy_errors,
-    repeat_lines,
-    repeats_text,
-)
 from robospa.results.scoring.scores import (
     IDLE,
     AverageScore,
@@ -159,7 +153,7 @@ def facts(run: Run) -> list[tuple[str, str]]:
     """The run's card, as name and text; facts that are not known are left out."""
     manifest, about = run.manifest, run.manifest.about
     settings, policy = manifest.settings, manifest.policy
-    spec = settings.policy.spec
+    spec, errors = settings.policy.spec, repeats.policy_errors(run)
     seeded = "honours the trial's policy seed" if policy.seeded else "ignores the policy seed"
     cameras = ", ".join(str(c.get("name", c)) if isinstance(c, Mapping) else c
                         for c in policy.cameras) or "no camera"  # fmt: skip
@@ -185,9 +179,9 @@ def facts(run: Run) -> list[tuple[str, str]]:
         ("policy latency", _latency(run)),
         ("time spent on", ", ".join(f"{name} {100 * share:.0f} %" for name, share in
                                  timing(run).items() if share >= 0.005)),
-        ("policy errors", "; ".join([error_rates_text(run)] * bool(policy_errors(run)) +
-                                    [f"{n} {why}" for n, why in policy_errors(run)])),
-        ("repeated trials", repeats_text(run)),
+        ("policy errors", "; ".join([repeats.error_rates_text(run)] * bool(errors) +
+                                    [f"{n} {why}" for n, why in errors])),
+        ("repeated trials", repeats.repeats_text(run)),
     ]  # fmt: skip
     return [(name, text) for name, text in found if text]
 
@@ -342,9 +336,9 @@ def print_scores(run: Run, results: ModelResults, beside: bool = True) -> None:
     console.print(_ends_line(run) + note, style="dim", soft_wrap=True)
     if used := usage_line(run.records.values()):
         console.print(f"used: {used}", style="dim", soft_wrap=True)
-    lines = [*missing_lines(scores), *loss_lines(run), *policy_error_lines(run)]
+    lines = [*missing_lines(scores), *loss_lines(run), *repeats.policy_error_lines(run)]
     odd = after_others([r for r in run.records.values() if finished(r)])
-    lines += [*[odd] * bool(odd), *repeat_lines(run), *problem_lines(run.records.values())]
+    lines += [*[odd] * bool(odd), *repeats.repeat_lines(run), *problem_lines(run.records.values())]
     for line in lines:
         console.print(line, style="yellow", soft_wrap=True)
 
@@ -394,4 +388,4 @@ def run_html(run: Run) -> str:
 
 
 def _hindrances(run: Run) -> list[str]:
-    return [*policy_error_lines(run), *problem_lines(run.records.values())]
+    return [*repeats.policy_error_lines(run), *problem_lines(run.records.values())]
