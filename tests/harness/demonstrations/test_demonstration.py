@@ -10,18 +10,8 @@ from robot_at_home import at_home
 from world_scenes import block
 
 from robospa.action_space import ActionSpace
+from robospa.harness.demonstrations import changed_plans as plans
 from robospa.harness.demonstrations import noise
-from robospa.harness.demonstrations.changed_plans import (
-    Displace,
-    GoWrong,
-    Wander,
-    beginnings,
-    marked,
-    middle_plan,
-    occasions,
-    split_steps,
-    wrong_plan,
-)
 from robospa.harness.demonstrations.demonstration import (
     DemonstrationWorld,
     ShownEpisode,
@@ -88,13 +78,13 @@ def test_without_shares_all_are_the_expert_s() -> None:
 
 
 def test_mistakes_are_those_that_a_scene_gives_occasion_for() -> None:
-    found = occasions(build_scene("Put_Bottles_Dustbin", 2, SEED))
+    found = plans.occasions(build_scene("Put_Bottles_Dustbin", 2, SEED))
     assert "drops" in found and "hasty" not in found and "neighbour" not in found
 
 
 def test_what_is_remembered_has_no_midstates() -> None:
     with pytest.raises(ValueError, match="remembered from its beginning"):
-        middle_plan(
+        plans.middle_plan(
             build_scene("Remember_Color_Cover", 2, SEED), generator_of(key("x"), "midstate")
         )
     assert kind_of(key("Remember_Color_Cover"), (0.0, 0.0, 1.0)) == "expert"
@@ -112,7 +102,7 @@ def test_what_is_remembered_has_no_midstates() -> None:
 def test_an_episode_begins_with_empty_hands_and_all_that_is_done_in_view(
     name: str, cuts: list[int]
 ) -> None:
-    assert beginnings(task(name).plan(build_scene(name, 3, SEED))) == cuts
+    assert plans.beginnings(task(name).plan(build_scene(name, 3, SEED))) == cuts
 
 
 def test_nothing_is_displaced_that_is_named_by_where_it_lies() -> None:
@@ -120,12 +110,12 @@ def test_nothing_is_displaced_that_is_named_by_where_it_lies() -> None:
         name: {
             type(call)
             for seed in range(8)
-            for call in middle_plan(build_scene(name, 2, SEED), np.random.default_rng(seed))
+            for call in plans.middle_plan(build_scene(name, 2, SEED), np.random.default_rng(seed))
         }
         for name in ("Pick_Blocks_Distance", "Pick_Blocks_Size")
     }
-    assert Displace not in events["Pick_Blocks_Distance"]
-    assert {Displace, Wander} <= events["Pick_Blocks_Size"]
+    assert plans.Displace not in events["Pick_Blocks_Distance"]
+    assert {plans.Displace, plans.Wander} <= events["Pick_Blocks_Size"]
 
 
 def test_a_mistake_is_marked_before_the_step_that_differs() -> None:
@@ -133,17 +123,17 @@ def test_a_mistake_is_marked_before_the_step_that_differs() -> None:
     plan = task(scene.task).plan(scene)
     first = plan[0]
     assert isinstance(first, Press)
-    assert marked(scene, (first, first)) == (first, GoWrong(), first)
-    assert marked(scene, plan) == (*plan, GoWrong())
+    assert plans.marked(scene, (first, first)) == (first, plans.GoWrong(), first)
+    assert plans.marked(scene, plan) == (*plan, plans.GoWrong())
     scene = build_scene("Put_Bottles_Dustbin", 2, SEED)
     pick, *_ = plan = task(scene.task).plan(scene)
     assert isinstance(pick, Pick)
-    assert marked(scene, (pick, Place(pick.object)))[0] == GoWrong()
+    assert plans.marked(scene, (pick, Place(pick.object)))[0] == plans.GoWrong()
 
 
 def planned(kind: str, name: str, level: int) -> tuple[Scene, tuple[object, ...]]:
     scene = build_scene(name, level, SEED)
-    return scene, wrong_plan(kind, scene)
+    return scene, plans.wrong_plan(kind, scene)
 
 
 def test_the_neighbour_is_not_the_target() -> None:
@@ -172,7 +162,7 @@ def test_a_repetition_presses_again_and_goes_no_further() -> None:
 
 def test_who_stops_early_does_the_first_part() -> None:
     scene, plan = planned("stops", "Put_Bottles_Dustbin", 5)
-    assert split_steps(plan) == split_steps(task(scene.task).plan(scene))[:2]  # type: ignore[arg-type]
+    assert plans.split_steps(plan) == plans.split_steps(task(scene.task).plan(scene))[:2]  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
