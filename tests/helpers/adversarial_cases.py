@@ -10,8 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from hands import Hands
+from official_limits import held
 
 from robospa.geometry import yaw_rotation
+
+Do = Callable[[Hands], object]
 
 
 @dataclass(frozen=True)
@@ -21,7 +24,7 @@ class Case:
     task: str
     level: int
     what: str
-    do: Callable[[Hands], None]
+    do: Do
     success: bool
     done: int
     events: tuple[str, ...] = ()
@@ -30,25 +33,24 @@ class Case:
     official: tuple[bool, int] | None = None
 
 
-def turned(degrees: float, aside: float = 0.0) -> Callable[[Hands], None]:
-    """Turns the near block into its partner's direction, but for so many degrees and metres."""
-
-    def do(h: Hands) -> None:
-        h.wait(2.2)
-        goal = {0: 0.0, 1: -90.0, 2: 180.0, 3: 90.0}[h.scene.facts["turns"][0]]
-        x, y, _ = h.at("near 0")
-        h.move("near 0", (x + aside, y), turn=yaw_rotation(math.radians(goal + degrees)))
-        h.finish()
-
-    return do
+def opened(h: Hands, index: int) -> None:
+    """Takes a cover to the place behind its block."""
+    h.move_by(f"covers {index}", 0.0, 0.13)
 
 
-def opened(h: Hands, index: int, dx: float = 0.0, dy: float = 0.13) -> None:
-    """Takes a cover to the place behind its block, or so far from where it stands."""
-    h.move_by(f"covers {index}", dx, dy)
+def undone(task: str, level: int, done: int, do: Do, undo: Do) -> Case:
+    """A case in which `done` subtasks are left after `undo`."""
+
+    def both(h: Hands) -> None:
+        do(h)
+        before = h.outcome.done
+        undo(h)
+        assert h.outcome.best >= before > 0
+
+    return Case(task, level, "does it and takes it back", both, False, done)
 
 
-PRESSES = (
+CASES = (
     Case("Press_Stapler_Repeat", 3, "taps with an open gripper",
          lambda h: h.touch("stapler", 3, closed=False), True, 3),
     Case("Press_Stapler_Repeat", 3, "hovers in the reported range three times, never touching",
@@ -58,8 +60,6 @@ PRESSES = (
     Case("Press_Stapler_Repeat", 3, "loses contact for one look in between",
          lambda h: h.touch("stapler", 3, apart=0.02), False, 1,
          departs="clicks and presses", official=(True, 3)),
-    Case("Press_Stapler_Repeat", 3, "taps 31 mm beside the press point",
-         lambda h: h.touch("stapler", 3, off=(0.031, 0, 0)), False, 0),
     Case("Press_Stapler_Repeat", 3, "taps with the palm",
          lambda h: h.touch("stapler", 3, with_body="left_arm"), False, 0),
     Case("Press_Stapler_Repeat", 3, "taps twice", lambda h: h.touch("stapler", 2), False, 2),
@@ -83,28 +83,14 @@ PRESSES = (
          lambda h: [h.touch(f"row {i}", h.scene.facts["counts"][i]) for i in (1, 0)], True, 2),
     Case("Press_Stapler_Memory", 2, "holds the finger down",
          lambda h: h.touch(f"row {np.argmax(h.scene.facts['counts'])}", 20, apart=0.0), False, 0),
-)  # fmt: skip
-
-CYCLES = (
-    Case("Lift_Fan_Repeat", 3, "is never let go",
-         lambda h: h.raise_by("thing", 0.08, 3), True, 3),
-    Case("Lift_Fan_Repeat", 3, "is lifted by 4.5 cm", lambda h: h.raise_by("thing", 0.045, 3),
-         False, 0),
-    Case("Lift_Fan_Repeat", 3, "is put down 5 cm aside",
-         lambda h: h.move_by("thing", 0.05, 0.0), False, 0),
-    Case("Lift_Fan_Repeat", 3, "comes back only to 3.9 cm above its place",
-         lambda h: (h.take("thing", 0.08), h.carry("thing", (*h.at("thing")[:2], 0.7785))),
-         False, 1),
+    Case("Lift_Fan_Repeat", 3, "is never let go", lambda h: h.raise_thrice("thing", 0.08), True, 3),
     Case("Lift_Fan_Repeat", 3, "is put down turned by 10 degrees",
          lambda h: h.move("thing", h.at("thing"), turn=yaw_rotation(0.17)), False, 0),
     Case("Lift_Fan_Repeat", 2, "is lifted five times", lambda h: h.plan_cycles(5), True, 2),
-    Case("Lift_Pot_Repeat", 3, "is lifted by one handle", lambda h: h.raise_by("thing", 0.11, 3),
+    Case("Lift_Pot_Repeat", 3, "is lifted by one handle", lambda h: h.raise_thrice("thing", 0.11),
          False, 0),
     Case("Lift_Pot_Repeat", 3, "is lifted by both handles once", lambda h: h.plan_cycles(1),
          False, 1),
-)  # fmt: skip
-
-ORDERS = (
     Case("Click_Objects_Order", 2, "second one first, then both in order",
          lambda h: [h.touch(f"order {i}") for i in (1, 0, 1)], True, 2, ("wrong_order",)),
     Case("Click_Objects_Order", 2, "second one first", lambda h: [
@@ -112,9 +98,9 @@ ORDERS = (
     Case("Click_Objects_Order", 3, "clicks with open grippers",
          lambda h: [h.touch(f"order {i}", closed=False) for i in range(3)], False, 0),
     Case("Click_Objects_Order", 2, "rests on the second while the first is clicked",
-         lambda h: h.touch_both("order 0", "order 1"), True, 2, ("wrong_order",)),
+         lambda h: h.touch_both(), True, 2, ("wrong_order",)),
     Case("Click_Bell_Clockwise_Order", 2, "rests on the second while the first is clicked",
-         lambda h: h.touch_both("order 0", "order 1"), False, 1, ("wrong_order",)),
+         lambda h: h.touch_both(), False, 1, ("wrong_order",)),
     Case("Click_Bell_Clockwise_Order", 3, "counter-clockwise",
          lambda h: [h.touch(f"order {i}") for i in (0, 2, 1)], False, 2, ("wrong_order",)),
     Case("Hit_Blocks_Hammer_Order", 2, "a bare gripper instead of the hammer",
@@ -129,9 +115,6 @@ ORDERS = (
     Case("Stamp_Seals_Order", 2, "carried over both pads, 10 cm high",
          lambda h: [h.over("seal", f"order {i}") for i in (0, 1)], False, 0,
          departs="Stamp_Seals_Order", official=(True, 2)),
-    Case("Stamp_Seals_Order", 2, "put down 12 mm beside the pads' middles",
-         lambda h: [h.move("seal", (h.at(f"order {i}")[0] + 0.012, h.at(f"order {i}")[1]))
-                    for i in (0, 1)], False, 0),
     Case("Stack_Blocks_Color_Order", 3, "a tower beside the middle",
          lambda h: h.tower((-0.2, -0.15)), True, 3),
     Case("Stack_Blocks_Color_Order", 3, "colours in reverse",
@@ -149,9 +132,6 @@ ORDERS = (
          departs="Stack_Blocks_*", official=(True, 1)),
     Case("Stack_Blocks_Color_Order", 1, "brought 6 cm beside the middle",
          lambda h: h.move("order 0", (0.06, -0.15)), False, 0),
-)  # fmt: skip
-
-FREE = (
     Case("Put_Bottles_Dustbin", 2, "one bottle falls beside the bin",
          lambda h: h.lay("bottles 0", (-0.7, 0.0, 0.03)), False, 0, ("dropped",)),
     Case("Put_Bottles_Dustbin", 1, "the bottle flies past the bin",
@@ -163,8 +143,6 @@ FREE = (
          lambda h: h.plan(), True, 1),
     Case("Move_Blocks_Apart", 2, "colours swapped",
          lambda h: (h.move("right 0", (-0.17, 0.0)), h.move("left 0", (0.17, 0.0))), False, 0),
-    Case("Move_Blocks_Apart", 2, "one block only 9.5 cm from the middle",
-         lambda h: (h.move("right 0", (0.095, 0.0)), h.move("left 0", (-0.17, 0.0))), False, 1),
     Case("Move_Blocks_Apart", 2, "the last block is held past the line",
          lambda h: (h.move("right 0", (0.17, 0.0)), h.move("left 0", (-0.17, 0.0), held=True)),
          False, 1, departs="placing", official=(True, 2)),
@@ -174,8 +152,6 @@ FREE = (
          (True, 2)),
     Case("Move_Playing_Cards_Away", 2, "both to the same side",
          lambda h: (h.move("boxes 0", (0.28, 0.0)), h.move("boxes 1", (0.28, -0.15))), True, 2),
-    Case("Move_Playing_Cards_Away", 2, "one only 22 cm away",
-         lambda h: (h.move("boxes 0", (0.28, 0.0)), h.move("boxes 1", (0.22, -0.15))), False, 1),
     Case("Place_Bowls_Plates", 2, "side by side on the plate",
          lambda h: (h.onto("bowls 0", "plate"), h.onto("bowls 1", "plate", dx=0.045)), False, 1),
     Case("Place_Bowls_Plates", 2, "stacked beside the plate",
@@ -190,8 +166,6 @@ FREE = (
          lambda h: (h.grip("left", 0.0), h.grip("right", 0.0), h.lay_by("forward 0", 0.1),
                     h.lay_by("backward 0", -0.1)), False, 2),
     Case("Rank_Blocks_Color", 2, "row reversed", lambda h: h.line((0.1, -0.1)), False, 1),
-    Case("Rank_Blocks_Color", 2, "one block 3.5 cm off the line",
-         lambda h: h.line((-0.1, 0.1), (0.0, 0.035)), False, 1),
     Case("Rank_Blocks_Color", 2, "the last block is held in line",
          lambda h: h.line((-0.1, 0.1), held=True), False, 1, departs="placing",
          official=(True, 2)),
@@ -203,14 +177,7 @@ FREE = (
          lambda h: (h.grip("right", 0.0), h.line((-0.2, -0.1), arm="left")), False, 2),
     Case("Rank_Blocks_Color", 1, "an idle gripper is closed",
          lambda h: (h.grip("right", 0.0), h.move("order 0", (0.0, -0.15), "left")), True, 1),
-)  # fmt: skip
-
-MEMORY = (
     *(Case(task, 1, "moves at once", lambda h: h.stir(0.05), False, 0, ("failed",))
-      for task in ("Observe_Blocks_Move_Memory", "Observe_Objects_Click_Memory",
-                   "Remember_Color_Cover", "Remember_Orientation_Restore")),
-    *(Case(task, 1, "moves by 2 cm at once, then solves it",
-           lambda h: (h.stir(0.02), h.plan(), h.finish()), True, 1)
       for task in ("Observe_Blocks_Move_Memory", "Observe_Objects_Click_Memory",
                    "Remember_Color_Cover", "Remember_Orientation_Restore")),
     Case("Observe_Blocks_Move_Memory", 2, "brings a right block, then a wrong one",
@@ -225,48 +192,19 @@ MEMORY = (
     Case("Observe_Objects_Click_Memory", 2, "clicks round and round",
          lambda h: (h.wait(2.2), *(h.touch(f"order {i}") for i in (1, 0, 1))), True, 2),
     Case("Observe_Objects_Click_Memory", 2, "rests on the second while the first is clicked",
-         lambda h: (h.wait(2.2), h.touch_both("order 0", "order 1")), True, 2),
+         lambda h: (h.wait(2.2), h.touch_both()), True, 2),
     Case("Remember_Color_Cover", 2, "puts a wrong cover aside, then opens in order",
-         lambda h: (h.wait(2.2), opened(h, 1, 0.08, 0.0), h.move_by("covers 1", -0.08, 0.0),
-                    opened(h, 0), opened(h, 1)), True, 2, ("wrong_object",)),
+         lambda h: (h.wait(2.2), h.move_by("covers 1", 0.08, 0.0),
+                    h.move_by("covers 1", -0.08, 0.0), opened(h, 0), opened(h, 1)), True, 2,
+         ("wrong_object",)),
     Case("Remember_Color_Cover", 2, "opens the second first",
          lambda h: (h.wait(2.2), opened(h, 1)), False, 0, ("failed", "wrong_order")),
     Case("Remember_Color_Cover", 2, "takes an opened cover again",
          lambda h: (h.wait(2.2), opened(h, 0), h.move_by("covers 0", 0.0, -0.13)), False, 1,
          ("failed",)),
-    Case("Remember_Color_Cover", 2, "opens the first 5 cm off its place",
-         lambda h: (h.wait(2.2), opened(h, 0, 0.05)), False, 0),
-    Case("Remember_Orientation_Restore", 1, "turns it 20 degrees wrong", turned(20), False, 0),
-    Case("Remember_Orientation_Restore", 1, "turns it 10 degrees wrong", turned(10), True, 1),
-    Case("Remember_Orientation_Restore", 1, "turns it the wrong way", turned(180), False, 0),
-    Case("Remember_Orientation_Restore", 1, "puts it down 3.5 cm off its place",
-         turned(0, 0.035), False, 0),
-)  # fmt: skip
-
-
-def both_lifted(rise: float, other: float, grip: float = 0.1) -> Callable[[Hands], None]:
-    """Another object goes up by `other` [m] in one hand, then the target by `rise` in the other."""
-
-    def do(h: Hands) -> None:
-        h.take_other(other)
-        h.take("target", rise, "left", grip)
-        h.click_lifted("target")
-
-    return do
-
-
-def lifted(rise: float, grip: float = 0.1, touched: bool = True) -> Callable[[Hands], None]:
-    """The target goes up by `rise` [m]."""
-
-    def do(h: Hands) -> None:
-        h.take("target", rise, "left", grip)
-        if touched:
-            h.click_lifted("target")
-
-    return do
-
-
-CHAINS = (
+    Case("Remember_Orientation_Restore", 1, "turns it the wrong way", lambda h: (
+         h.wait(2.2), h.move("near 0", h.at("near 0")[:2], turn=yaw_rotation(
+             math.pi / 2 * (2 - h.scene.facts["turns"][0]))), h.finish()), False, 0),
     Case("Place_Phone_Press_Stapler", 4, "presses before the phone is on its stand",
          lambda h: (h.touch("stapler", 3), h.plan(0)), True, 4, ("wrong_order",)),
     Case("Place_Phone_Press_Stapler", 2, "five presses", lambda h: (
@@ -281,8 +219,6 @@ CHAINS = (
          departs="thrown into a bin", official=(False, 1)),
     Case("Place_Phone_Press_Stapler", 5, "the ball lies on the floor",
          lambda h: h.lay("garbage", (0.0, -0.6, 0.0)), False, 0),
-    Case("Place_Bottle_Cup", 4, "cup 5 cm off its coaster",
-         lambda h: (h.onto("cup_0", "coaster_0", dx=0.05), h.finish()), False, 0),
     Case("Place_Bottle_Cup", 4, "cup taken away again",
          lambda h: (h.onto("cup_0", "coaster_0"), h.move("cup_0", (0.2, -0.2))), False, 1),
     Case("Place_Bottle_Cup", 5, "both cups on the first coaster, one after the other",
@@ -290,13 +226,6 @@ CHAINS = (
                     h.onto("cup_1", "coaster_0")), False, 2),
     Case("Place_Bottle_Cup", 1, "the bottle is in the bin, a gripper stays closed",
          lambda h: (h.grip("right", 0.0), h.plan()), False, 1),
-    Case("Hang_Mug_Stack_Blocks", 2, "red block at y = -0.06",
-         lambda h: h.move("red", (-0.16, -0.06)), False, 0),
-    Case("Hang_Mug_Stack_Blocks", 3, "red block at y = -0.06",
-         lambda h: h.move("red", (-0.16, -0.06)), False, 1),
-    Case("Hang_Mug_Stack_Blocks", 3, "green block on the red one, 2 cm aside",
-         lambda h: (h.move("red", (-0.16, -0.13)), h.onto("green", "red", "press", 0.02)),
-         False, 1),
     Case("Hang_Mug_Stack_Blocks", 2, "red block before the mug",
          lambda h: (h.move("red", (-0.16, -0.13)), h.hang()), True, 2, ("wrong_order",)),
     Case("Hang_Mug_Stack_Blocks", 1, "the mug is held at the peg",
@@ -322,10 +251,6 @@ CHAINS = (
     Case("Place_Burger_Fries_Click_Bell", 1, "the burger is held over its half",
          lambda h: h.over("burger", "tray", "left"), False, 0, departs="placing",
          official=(True, 1)),
-    Case("Place_Burger_Fries_Click_Bell", 4, "the burger comes back 5 cm beside its place",
-         lambda h: (h.serve(), h.touch("bell"), h.home("burger", 0.05)), False, 3),
-    Case("Place_Burger_Fries_Click_Bell", 4, "the burger comes back 3 cm beside its place",
-         lambda h: (h.serve(), h.touch("bell"), h.home("burger", 0.03)), True, 4),
     Case("Click_Can_Place_Items", 3, "both clicks first",
          lambda h: (h.touch("can", 2), h.onto("bread", "basket")), True, 3, ("wrong_order",)),
     Case("Click_Can_Place_Items", 1, "the gripper stays closed", lambda h: h.touch("can"), True, 1),
@@ -336,8 +261,6 @@ CHAINS = (
     Case("Click_Can_Place_Items", 2, "the bread is held over the basket",
          lambda h: (h.touch("can"), h.over("bread", "basket")), False, 1, departs="placing",
          official=(False, 2)),
-    Case("Click_Can_Place_Items", 4, "the pill bottle stands 4 cm off the pad's middle",
-         lambda h: (h.onto("pill_bottle", "pad", dx=0.04), h.finish()), False, 0),
     Case("Click_Bell_Open_Microwave_Place_Object", 1, "the gripper stays closed",
          lambda h: h.touch("bell"), True, 1),
     Case("Click_Bell_Open_Microwave_Place_Object", 2, "clicks with the other arm",
@@ -352,7 +275,8 @@ CHAINS = (
          lambda h: (h.touch("bell", 2), h.plan(1), h.beside("object", "reference", 0.12)),
          False, 3),
     Case("Stamp_Seals_Press_Stapler", 2, "bounces on the pad, 11 mm high",
-         lambda h: (h.onto("left_seal", "left_pad"), h.bounce("left_seal", 0.011)), False, 1,
+         lambda h: (h.onto("left_seal", "left_pad"), h.lay_by("left_seal", dz=0.011),
+                    h.lay_by("left_seal", dz=-0.011)), False, 1,
          departs="Stamp_Seals_Press_Stapler", official=(True, 2)),
     Case("Stamp_Seals_Press_Stapler", 4, "the right seal first",
          lambda h: (h.stamp("right", 2), h.stamp("left", 2)), True, 4, ("wrong_order",)),
@@ -361,58 +285,27 @@ CHAINS = (
          ("wrong_order",)),
     Case("Stamp_Seals_Press_Stapler", 2, "stamps three times", lambda h: h.stamp("left", 3),
          True, 2),
-)  # fmt: skip
-
-PICKS = (
     Case("Pick_Cups_Canonical", 3, "lifts target and neighbour at once",
-         both_lifted(0.08, 0.08), False, 0),
-    Case("Pick_Cups_Canonical", 3, "lifts the neighbour, puts it back, lifts the target",
-         lambda h: (h.take_other(0.08, back=True), h.take("target", 0.08, "left")), True, 1,
-         ("wrong_object",)),
-    Case("Pick_Cups_Canonical", 3, "lifts the target by 3.5 cm", lifted(0.035), False, 0),
-    Case("Pick_Blocks_Size", 3, "lifts target and neighbour at once", both_lifted(0.1, 0.1),
-         True, 1),
+         lambda h: held(h, 0.08, other=0.08), False, 0),
+    *(Case(task, 3, "lifts target and neighbour at once",
+           lambda h: held(h, 0.1, other=0.1), True, 1)
+      for task in ("Pick_Blocks_Size", "Pick_Cans_Relational", "Pick_Sauce_Can_Multi_View")),
+    *(Case(task, level, "lifts another one, puts it back, lifts the target",
+           lambda h: (h.take_other(0.08, back=True), h.take("target", 0.08, "left")), True, 1,
+           ("wrong_object",))
+      for task, level in (("Pick_Cups_Canonical", 3), ("Pick_Tea_Box_Relational", 1))),
     Case("Pick_Blocks_Size", 3, "lifts the neighbour", lambda h: h.take_other(0.1), False, 0,
          ("wrong_object",)),
     Case("Pick_Blocks_Size", 3, "throws the target up",
          lambda h: h.lay("target", (0.0, 0.0, 0.9)), False, 0, departs="all", official=(True, 1)),
-    Case("Pick_Blocks_Distance", 2, "lifts the target by 5.5 cm", lifted(0.055), False, 0),
-    Case("Pick_Cans_Relational", 3, "lifts target and neighbour at once", both_lifted(0.08, 0.08),
-         True, 1),
-    Case("Pick_Cans_Relational", 3, "lifts with the gripper at 0.25", lifted(0.08, 0.25), False, 0),
-    Case("Pick_Cans_Relational", 3, "lifts the target by 5.5 cm", lifted(0.055), False, 0),
-    Case("Pick_Sauce_Can_Multi_View", 3, "lifts target and neighbour at once",
-         both_lifted(0.08, 0.08), True, 1),
-    Case("Pick_Sauce_Can_Multi_View", 3, "no finger is in contact", lifted(0.08, touched=False),
-         False, 0),
+    Case("Pick_Sauce_Can_Multi_View", 3, "no finger is in contact",
+         lambda h: h.take("target", 0.08, "left"), False, 0),
     Case("Pick_Sauce_Can_Multi_View", 3, "a finger is in contact with another can only",
-         lambda h: (h.take("target", 0.08, "left"), h.touch_other()), False, 0,
+         lambda h: (h.take("target", 0.08, "left"), h.click_lifted(other=True)), False, 0,
          departs="Pick_Seals_Multi_View, Pick_Breads_Multi_View, Pick_Sauce_Can_Multi_View",
          official=(True, 1)),
     Case("Pick_Tea_Box_Relational", 2, "lifts the reference",
          lambda h: h.take("reference", 0.08), False, 0, ("wrong_object",)),
-    Case("Pick_Tea_Box_Relational", 1, "lifts the reference, puts it back, lifts the target",
-         lambda h: (h.take_other(0.08, back=True), h.take("target", 0.08, "left")), True, 1,
-         ("wrong_object",)),
-)  # fmt: skip
-
-
-Deed = Callable[[Hands], object]
-
-
-def undone(task: str, level: int, done: int, do: Deed, undo: Deed) -> Case:
-    """A case in which `done` subtasks are left after `undo`."""
-
-    def both(h: Hands) -> None:
-        do(h)
-        before = h.outcome.done
-        undo(h)
-        assert h.outcome.best >= before > 0
-
-    return Case(task, level, "does it and takes it back", both, False, done)
-
-
-UNDONE = (
     *(undone("Place_Object_Scale_Click", n, done, lambda h: h.onto("bell", "scale"),
              lambda h: h.move("bell", (-0.5, 0.1, h.at("bell")[2] + 0.1)))
       for n, done in ((2, 0), (3, 0), (4, 1), (5, 1))),

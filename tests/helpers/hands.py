@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from snapshots_by_hand import AWAY
-from teleport import Teleport
+from teleport import Teleport, mix
 
 from robospa.action_space import ARMS
 from robospa.geometry import Pose, Vec3
@@ -36,6 +36,10 @@ class Hands(Teleport):
     def at(self, fact: str) -> Vec3:
         """Where an object's origin is."""
         return self.poses[self.named(fact)].position
+
+    def point(self, fact: str, frame: str) -> Vec3:
+        """Where a frame of an object is."""
+        return self.frame(self.named(fact), frame).position
 
     def _side(self, fact: str, arm: str | None) -> int:
         return ARMS.index(arm) if arm else int(self.at(fact)[0] > 0)
@@ -72,25 +76,23 @@ class Hands(Teleport):
 
         The simulator reports a finger that hovers up to 2 cm above as one that does not push.
         """
-        name = self.named(fact)
-        x, y, z = (self.poses[name] * self.models[name].frames["touched"]).position
+        x, y, z = self.point(fact, "touched")
         hand = self._side(fact, arm)
         self.gripper[hand] = 0.0 if closed else 1.0
         point = (x + off[0], y + off[1], z + off[2])
         body = with_body or f"{ARMS[hand]}_gripper"
         for _ in range(times):
-            self.tick(4, [Contact(name, body, point, pushing)])
+            self.tick(4, [Contact(self.named(fact), body, point, pushing)])
             self.tick(round(apart / 0.02))
 
-    def touch_both(self, first: str, second: str) -> None:
-        """One hand touches `second` and stays there while the other one clicks `first`."""
+    def touch_both(self) -> None:
+        """One hand touches "order 1" and stays there while the other one clicks "order 0"."""
         marks = []
-        for fact in (second, first):
-            name = self.named(fact)
-            hand = ARMS[self._side(fact, None)]
-            self.gripper[self._side(fact, None)] = 0.0
-            point = (self.poses[name] * self.models[name].frames["touched"]).position
-            marks.append(Contact(name, f"{hand}_gripper", point))
+        for fact in ("order 1", "order 0"):
+            hand = self._side(fact, None)
+            self.gripper[hand] = 0.0
+            name, point = self.named(fact), self.point(fact, "touched")
+            marks.append(Contact(name, f"{ARMS[hand]}_gripper", point))
             self.tick(4, marks)
         self.tick(4, marks)
 
@@ -131,22 +133,20 @@ class Hands(Teleport):
 
     def onto(self, fact: str, target: str, frame: str = "support", dx: float = 0.0) -> None:
         """`move` to the frame of another object, or so far to its right."""
-        name = self.named(target)
-        x, y, z = (self.poses[name] * self.models[name].frames[frame]).position
+        x, y, z = self.point(target, frame)
         self.move(fact, (x + dx, y, z - self.models[self.named(fact)].bottom))
 
     def over(self, fact: str, target: str, frame: str = "support", dz: float = 0.1) -> None:
         """Hold an object above the frame of another one."""
-        name = self.named(target)
-        x, y, z = (self.poses[name] * self.models[name].frames[frame]).position
+        x, y, z = self.point(target, frame)
         self.move(fact, (x, y, z + dz), held=True)
 
-    def raise_by(self, fact: str, rise: float, times: int = 1, grip: float = 0.1) -> None:
-        """Lift an object and lower it to where it was, never letting go."""
+    def raise_thrice(self, fact: str, rise: float) -> None:
+        """Lift an object and lower it to where it was, three times, never letting go."""
         x, y, z = self.at(fact)
         hand, name = self._side(fact, None), self.named(fact)
-        self.take(fact, 0.01, grip=grip)
-        for _ in range(times):
+        self.take(fact, 0.01)
+        for _ in range(3):
             self._carry(name, hand, (x, y, z + rise))
             self.tick(3)
             self._carry(name, hand, (x, y, z))
@@ -169,25 +169,28 @@ class Hands(Teleport):
         self.poses[name] = Pose(at, self.poses[name].rotation)
         self.tick(5)
 
-    def lay_by(self, fact: str, dy: float) -> None:
-        """`lay` an object farther away or nearer."""
+    def lay_by(self, fact: str, dy: float = 0.0, dz: float = 0.0) -> None:
+        """`lay` an object farther away or nearer, or higher."""
         x, y, z = self.at(fact)
-        self.lay(fact, (x, y + dy, z))
+        self.lay(fact, (x, y + dy, z + dz))
 
     def fly(self, fact: str, start: Vec3, end: Vec3) -> None:
         """An object falls from one place to the other, at 2 m/s."""
         name = self.named(fact)
         steps = max(2, round(abs(start[2] - end[2]) / 0.04))
         for i in range(steps + 1):
-            t = i / steps
-            x, y, z = (a + t * (b - a) for a, b in zip(start, end, strict=True))
-            self.poses[name] = Pose((x, y, z), self.poses[name].rotation)
+            self.poses[name] = Pose(mix(start, end, i / steps), self.poses[name].rotation)
             self.tick()
         self.tick(5)
 
-    def click_lifted(self, fact: str, touched: str = "") -> None:
-        """A contact of the left gripper with an object (or with another one) that hangs there."""
-        name = self.named(touched or fact)
+    def _other(self) -> str:
+        """An object that is not the target."""
+        target = self.named("target")
+        return next(o.name for o in self.scene.objects if o.name != target and not o.fixed)
+
+    def click_lifted(self, other: bool = False) -> None:
+        """A contact of the left gripper with the target, or with an `other` object."""
+        name = self._other() if other else self.named("target")
         self.tick(2, [Contact(name, "left_gripper", self.poses[name].position)])
 
     def plan_cycles(self, times: int) -> None:
@@ -236,37 +239,22 @@ class Hands(Teleport):
 
     def take_other(self, rise: float, back: bool = False) -> None:
         """The right hand lifts an object that is not the target, and puts it `back` or keeps it."""
-        target = self.named("target")
-        name = next(o.name for o in self.scene.objects if o.name != target and not o.fixed)
+        name = self._other()
         x, y, z = self.poses[name].position
         self._pick(Pick(name, rise, "right"))
         if back:
             self._carry(name, 1, (x, y, z))
             self._let_go(1)
 
-    def touch_other(self) -> None:
-        """A contact of the left gripper with an object that is not the target."""
-        target = self.named("target")
-        name = next(o.name for o in self.scene.objects if o.name != target)
-        self.tick(2, [Contact(name, "left_gripper", self.poses[name].position)])
-
     def hang(self, held: bool = False) -> None:
         """The mug's handle at the peg's place."""
-        (x, y, z), (hx, hy, hz) = (
-            (self.poses[self.named(fact)] * self.models[self.named(fact)].frames[frame]).position
-            for fact, frame in (("rack", "hang"), ("mug", "handle"))
-        )
+        (x, y, z), (hx, hy, hz) = self.point("rack", "hang"), self.point("mug", "handle")
         self.move_by("mug", x - hx, y - hy, z - hz, held=held)
 
     def serve(self) -> None:
         """Burger and fries on their halves of the tray."""
         self.onto("burger", "tray", "left")
         self.onto("fries", "tray", "right")
-
-    def home(self, fact: str, aside: float = 0.0) -> None:
-        """Take an object back to where it was, or so far to the left of it."""
-        x, y, z = self.scene.object(self.named(fact)).pose.position
-        self.move(fact, (x - aside, y, z))
 
     def door(self, angle: float) -> None:
         """The microwave's door gets to so many radians by itself."""
@@ -284,9 +272,3 @@ class Hands(Teleport):
         for _ in range(times):
             self.onto(seal, pad)
             self.move_by(seal, 0.0, 0.0, 0.05)
-
-    def bounce(self, fact: str, rise: float) -> None:
-        """An object hops by so much."""
-        x, y, z = self.at(fact)
-        self.lay(fact, (x, y, z + rise))
-        self.lay(fact, (x, y, z))

@@ -8,10 +8,11 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
 from hands import Hands
 from snapshots_by_hand import AWAY
 
-from robospa.geometry import Pose, multiply, yaw_rotation
+from robospa.geometry import Pose, Vec3, axis_rotation, multiply, vec3, yaw_rotation
 from robospa.tasks.snapshot import Contact
 
 Do = Callable[[Hands, float], object]
@@ -33,82 +34,57 @@ class Limit:
     done: int = 1
 
 
-def beside(fact: str, target: str, frame: str = "support", axis: int = 0, dz: float = 0.0) -> Do:
+def lay_off(h: Hands, fact: str, at: Vec3, axis: int, value: float) -> None:
+    """Lays an object so far off a place along an axis."""
+    h.lay(fact, vec3([x + value * (k == axis) for k, x in enumerate(at)]))
+
+
+def beside(fact: str, target: str, frame: str = "support", axis: int = 0) -> Do:
     """Lays an object on a frame of another one, but so far off along an axis."""
 
     def do(h: Hands, value: float) -> None:
-        name = h.named(target)
-        x, y, z = (h.poses[name] * h.models[name].frames[frame]).position
-        at = [x, y, z - h.models[h.named(fact)].bottom + dz]
-        at[axis] += value
-        h.lay(fact, (at[0], at[1], at[2]))
+        x, y, z = h.point(target, frame)
+        lay_off(h, fact, (x, y, z - h.models[h.named(fact)].bottom), axis, value)
 
     return do
 
 
-def place(fact: str, *at: float | None, after: Callable[[Hands], object] | None = None) -> Do:
-    """Lays an object at a place of which None is the value; without z at its first height."""
+def place(fact: str, x: float | None, y: float | None) -> Do:
+    """Lays an object at a place of which None is the value, at its first height."""
 
     def do(h: Hands, value: float) -> None:
-        if after is not None:
-            after(h)
-        found = [value if v is None else v for v in at]
-        z = found[2] if len(found) > 2 else h.at(fact)[2]
-        h.lay(fact, (found[0], found[1], z))
+        h.lay(fact, (value if x is None else x, value if y is None else y, h.at(fact)[2]))
 
     return do
 
 
-def nudged(fact: str, axis: int, after: Callable[[Hands], object] | None = None) -> Do:
+def nudged(fact: str, axis: int, after: Callable[[Hands], object] = lambda h: None) -> Do:
     """Lays an object so far off its place along an axis."""
 
     def do(h: Hands, value: float) -> None:
-        at = list(h.scene.object(h.named(fact)).pose.position)
-        if after is not None:
-            after(h)
-        at[axis] += value
-        h.lay(fact, (at[0], at[1], at[2]))
+        after(h)
+        lay_off(h, fact, h.scene.object(h.named(fact)).pose.position, axis, value)
 
     return do
 
 
 def tapped(fact: str, axis: int) -> Do:
     """Touches an object so far off its press point."""
-
-    def do(h: Hands, value: float) -> None:
-        off = [0.0, 0.0, 0.0]
-        off[axis] = value
-        h.touch(fact, off=(off[0], off[1], off[2]))
-
-    return do
+    return lambda h, value: h.touch(fact, off=vec3(value * np.eye(3)[axis]))
 
 
 def pot(h: Hands, z: float) -> None:
-    """The pot upright with its origin at a height, both hands at its handles; then back."""
-    name = h.named("thing")
-    home = h.poses[name]
-    h.poses[name] = Pose((*home.position[:2], z), home.rotation)
-    h.grasp = [h.poses[name].apply(h.models[name].frames[a].position) for a in ("left", "right")]
+    """The pot upright with its origin at a height, both hands at its handles; then they go."""
+    h.poses[h.named("thing")] = Pose((*h.at("thing")[:2], z))
+    h.grasp = [h.point("thing", arm) for arm in ("left", "right")]
     h.tick(2)
-    h.grasp, h.poses[name] = list(AWAY), home
-    h.tick(2)
+    h.grasp = list(AWAY)
 
 
-def above_pot(do: Do) -> Do:
-    """`do`, right after the pot was up."""
-
-    def then(h: Hands, value: float) -> None:
-        name = h.named("thing")
-        home = h.poses[name].position
-        h.poses[name] = Pose((home[0], home[1], 0.9))
-        h.grasp = [
-            h.poses[name].apply(h.models[name].frames[a].position) for a in ("left", "right")
-        ]
-        h.tick(2)
-        h.grasp = list(AWAY)
-        do(h, value)
-
-    return then
+def in_line(h: Hands, fact: str, frame: str, goal: Vec3, axis: int, value: float) -> None:
+    """Lays an object with its frame at the goal, so far off along an axis."""
+    at = np.add(h.at(fact), goal) - h.point(fact, frame)
+    lay_off(h, fact, vec3(at), axis, value)
 
 
 def on_block(h: Hands, upper: str, lower: str, dz: float, dx: float = 0.0) -> None:
@@ -119,34 +95,20 @@ def on_block(h: Hands, upper: str, lower: str, dz: float, dx: float = 0.0) -> No
 
 def hung(h: Hands, axis: int, value: float) -> None:
     """Lays the mug with its handle at the peg, so far off along an axis (z: at that height)."""
-    peg = (h.poses[h.named("rack")] * h.models[h.named("rack")].frames["hang"]).position
-    handle = (h.poses[h.named("mug")] * h.models[h.named("mug")].frames["handle"]).position
-    goal = [*peg]
-    goal[axis] = value if axis == 2 else goal[axis] + value
-    at = [p + g - q for p, g, q in zip(h.at("mug"), goal, handle, strict=True)]
-    h.lay("mug", (at[0], at[1], at[2]))
+    peg = h.point("rack", "hang")
+    in_line(h, "mug", "handle", peg, axis, value - peg[2] if axis == 2 else value)
 
 
 def docked(h: Hands, axis: int, value: float) -> None:
     """Lays the phone's end at the stand's, so far off along an axis."""
-    goal, end = (
-        (h.poses[h.named(fact)] * h.models[h.named(fact)].frames["end"]).position
-        for fact in ("phone_stand", "phone")
-    )
-    at = [p + g - q for p, g, q in zip(h.at("phone"), goal, end, strict=True)]
-    at[axis] += value
-    h.lay("phone", (at[0], at[1], at[2]))
+    in_line(h, "phone", "end", h.point("phone_stand", "end"), axis, value)
 
 
 def struck(h: Hands, axis: int, value: float) -> None:
     """The hammer's head touches the first block, so far off the middle of its top."""
-    block, tool = h.named("order 0"), h.named("hammer")
-    x, y, z = (h.poses[block] * h.models[block].frames["press"]).position
-    head = (h.poses[tool] * h.models[tool].frames["head"]).position
-    at = [p + g - q for p, g, q in zip(h.at("hammer"), (x, y, z), head, strict=True)]
-    at[axis] += value
-    h.lay("hammer", (at[0], at[1], at[2]))
-    h.tick(2, [Contact(block, tool, (x, y, z))])
+    top = h.point("order 0", "press")
+    in_line(h, "hammer", "head", top, axis, value)
+    h.tick(2, [Contact(h.named("order 0"), h.named("hammer"), top)])
 
 
 def left_of(h: Hands, dx: float, dy: float = 0.0) -> None:
@@ -158,11 +120,9 @@ def left_of(h: Hands, dx: float, dy: float = 0.0) -> None:
 def restored(h: Hands, degrees: float = 0.0, dx: float = 0.0, dz: float = 0.0) -> None:
     """The near block as its partner lies, but tilted about x or moved by so much."""
     h.wait(2.2)
-    angle = (0.0, -90.0, 180.0, 90.0)[h.scene.facts["turns"][0]]
-    half = math.radians(degrees) / 2
-    tilt = (math.cos(half), math.sin(half), 0.0, 0.0)
     x, y, z = h.at("near 0")
-    turned = multiply(yaw_rotation(math.radians(angle)), tilt)
+    tilt = axis_rotation((1.0, 0.0, 0.0), math.radians(degrees))
+    turned = multiply(yaw_rotation(-math.pi / 2 * h.scene.facts["turns"][0]), tilt)
     h.poses[h.named("near 0")] = Pose((x + dx, y, z + dz), turned)
     h.tick(3)
 
@@ -182,39 +142,42 @@ def behind(axis: int) -> Do:
 
     def do(h: Hands, value: float) -> None:
         x, y, z = h.at("covers 0")
-        at = [x, y + 0.13, z]
-        at[axis] += value
-        h.lay("covers 0", (at[0], at[1], at[2]))
+        lay_off(h, "covers 0", (x, y + 0.13, z), axis, value)
 
     return waited(do)
 
 
-PRESSES = tuple(
-    Limit(task, level, f"{fact}, axis {axis}", size[axis], tapped(fact, axis), done=1)
-    for task, level, fact, size in (
-        ("Press_Stapler_Repeat", 3, "stapler", (0.03, 0.03, 0.03)),
-        ("Click_Bell_Repeat", 3, "bell", (0.025, 0.025, 0.03)),
-        ("Click_Bell_Clockwise_Order", 1, "order 0", (0.025, 0.025, 0.03)),
-        ("Click_Objects_Order", 1, "order 0", (0.03, 0.03, 0.03)),
-        ("Click_Can_Place_Items", 1, "can", (0.03, 0.03, 0.04)),
-        ("Place_Object_Scale_Click", 3, "cards", (0.03, 0.03, 0.03)),
-        ("Place_Burger_Fries_Click_Bell", 3, "bell", (0.025, 0.025, 0.03)),
-        ("Click_Bell_Open_Microwave_Place_Object", 1, "bell", (0.025, 0.025, 0.03)),
-        ("Stamp_Seals_Press_Stapler", 5, "stapler", (0.03, 0.03, 0.03)),
-        ("Place_Phone_Press_Stapler", 2, "stapler", (0.03, 0.03, 0.03)),
-    )
-    for axis in (0, 1, 2)
-)
+def held(h: Hands, rise: float, grip: float = 0.1, other: float = 0.0) -> None:
+    """The target goes up by `rise`, after another object went up by `other`."""
+    if other:
+        h.take_other(other)
+    h.take("target", rise, "left", grip)
+    h.click_lifted()
 
-PLACES = (
+
+LIMITS = (
+    *(Limit(task, level, f"{fact}, axis {axis}", size[axis], tapped(fact, axis))
+      for task, level, fact, size in (
+          ("Press_Stapler_Repeat", 3, "stapler", (0.03, 0.03, 0.03)),
+          ("Click_Bell_Repeat", 3, "bell", (0.025, 0.025, 0.03)),
+          ("Click_Bell_Clockwise_Order", 1, "order 0", (0.025, 0.025, 0.03)),
+          ("Click_Objects_Order", 1, "order 0", (0.03, 0.03, 0.03)),
+          ("Click_Can_Place_Items", 1, "can", (0.03, 0.03, 0.04)),
+          ("Place_Object_Scale_Click", 3, "cards", (0.03, 0.03, 0.03)),
+          ("Place_Burger_Fries_Click_Bell", 3, "bell", (0.025, 0.025, 0.03)),
+          ("Click_Bell_Open_Microwave_Place_Object", 1, "bell", (0.025, 0.025, 0.03)),
+          ("Stamp_Seals_Press_Stapler", 5, "stapler", (0.03, 0.03, 0.03)),
+          ("Place_Phone_Press_Stapler", 2, "stapler", (0.03, 0.03, 0.03)),
+      ) for axis in (0, 1, 2)),
     Limit("Lift_Fan_Repeat", 1, "lifted", 0.05,
           lambda h, v: (nudged("thing", 2)(h, v), nudged("thing", 2)(h, 0.0)), least=True),
     *(Limit("Lift_Fan_Repeat", 1, f"home, axis {axis}", 0.04,
             nudged("thing", axis, after=lambda h: nudged("thing", 2)(h, 0.1)))
       for axis in (0, 1, 2)),
-    Limit("Lift_Pot_Repeat", 1, "lifted", 0.82, pot, least=True),
-    Limit("Lift_Pot_Repeat", 1, "aside", 0.08, above_pot(nudged("thing", 0))),
-    Limit("Lift_Pot_Repeat", 1, "down", 0.07, above_pot(nudged("thing", 2))),
+    Limit("Lift_Pot_Repeat", 1, "lifted", 0.82,
+          lambda h, v: (pot(h, v), nudged("thing", 2)(h, 0.0)), least=True),
+    Limit("Lift_Pot_Repeat", 1, "aside", 0.08, nudged("thing", 0, after=lambda h: pot(h, 0.9))),
+    Limit("Lift_Pot_Repeat", 1, "down", 0.07, nudged("thing", 2, after=lambda h: pot(h, 0.9))),
     Limit("Move_Blocks_Apart", 2, "right", 0.1, place("right 0", None, 0.0), least=True),
     Limit("Move_Blocks_Apart", 2, "left", -0.1, place("left 0", None, 0.0)),
     Limit("Move_Playing_Cards_Away", 2, "right", 0.23, place("boxes 0", None, 0.0), least=True),
@@ -282,9 +245,6 @@ PLACES = (
           lambda h, v: on_block(h, "left_seal", "left_pad", v)),
     *(Limit("Stamp_Seals_Order", 1, f"stamp, axis {axis}", 0.01,
             beside("seal", "order 0", axis=axis)) for axis in (0, 1)),
-)  # fmt: skip
-
-MEMORY = (
     *(Limit("Remember_Color_Cover", 2, f"open place, axis {axis}", value, behind(axis))
       for axis, value in enumerate((0.045, 0.045, 0.005))),
     Limit("Observe_Blocks_Move_Memory", 2, "strip, y", -0.11,
@@ -297,18 +257,6 @@ MEMORY = (
     *(Limit(task, 1, "stillness", 0.03, lambda h, v: (h.stir(v), h.plan(), h.finish()))
       for task in ("Observe_Blocks_Move_Memory", "Observe_Objects_Click_Memory",
                    "Remember_Color_Cover", "Remember_Orientation_Restore")),
-)  # fmt: skip
-
-
-def held(h: Hands, rise: float, grip: float = 0.1, other: float = 0.0) -> None:
-    """The target goes up by `rise`, after another object went up by `other`."""
-    if other:
-        h.take_other(other)
-    h.take("target", rise, "left", grip)
-    h.click_lifted("target")
-
-
-PICKS = (
     *(Limit(task, 3, "height", 0.82, lambda h, v: held(h, v - h.at("target")[2]), least=True)
       for task in ("Pick_Blocks_Size", "Pick_Blocks_Height", "Pick_Blocks_Length",
                    "Pick_Blocks_Area", "Pick_Blocks_Distance", "Pick_Mugs_Distance",
@@ -325,5 +273,3 @@ PICKS = (
     *(Limit(task, 3, "closed gripper", 0.2, lambda h, v: held(h, 0.08, v))
       for task in ("Pick_Tea_Box_Relational", "Pick_Seals_Multi_View")),
 )  # fmt: skip
-
-LIMITS = (*PRESSES, *PLACES, *MEMORY, *PICKS)

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
-from snapshots_by_hand import AWAY, DOWN, TICK
+from snapshots_by_hand import AWAY, TICK, snap
 
 from robospa.action_space import ARMS
 from robospa.geometry import Pose, Vec3, rotate, yaw_rotation
@@ -69,17 +70,13 @@ class Teleport:
             for o in self.scene.objects
             if o.appears_at is None or o.appears_at <= self.time + 1e-9
         }
-        left, right = (Pose((x, y, z + 0.12), DOWN) for x, y, z in self.grasp)
-        opening = (self.gripper[0], self.gripper[1])
-        return Snapshot(
-            self.time,
-            there,
-            opening,
-            (left, right),
-            grasp_points=(self.grasp[0], self.grasp[1]),
-            contacts=tuple(contacts),
-            hinges=dict(self.hinges),
-        )
+        opening, grasp = (self.gripper[0], self.gripper[1]), (self.grasp[0], self.grasp[1])
+        now = snap(self.time, {}, opening, grasp)
+        return replace(now, poses=there, contacts=tuple(contacts), hinges=dict(self.hinges))
+
+    def frame(self, name: str, frame: str) -> Pose:
+        """A frame of an object, in the world."""
+        return self.poses[name] * self.models[name].frames[frame]
 
     def tick(self, count: int = 1, contacts: Iterable[Contact] = ()) -> None:
         """Let time pass; nothing is heard after the end."""
@@ -96,41 +93,21 @@ class Teleport:
         return self
 
     def do(self, skill: Skill) -> None:
-        """Carry out one skill."""
-        if isinstance(skill, Wait):
-            self.tick(round(skill.seconds / TICK))
-        elif isinstance(skill, Home):
-            self.gripper, self.grasp = [1.0, 1.0], list(AWAY)
-            self.tick()
-        elif isinstance(skill, Press):
-            self._press(skill)
-        elif isinstance(skill, Pick):
-            self._pick(skill)
-        elif isinstance(skill, Place):
-            self._place(skill)
-        elif isinstance(skill, Drop):
-            self._drop(skill)
-        elif isinstance(skill, Open):
-            self._open(skill)
-        elif isinstance(skill, Stamp):
-            self._stamp(skill)
-        elif isinstance(skill, Dock | Hang):
-            self._dock(skill)
-        elif isinstance(skill, Pour):
-            self._pour(skill)
-        elif isinstance(skill, RaiseLower):
-            self._raise_lower(skill)
-        elif isinstance(skill, Hit):
-            self._hit(skill)
-        else:
-            raise AssertionError(f"no such skill here: {skill}")
+        """Carry out one skill, by the method of its name."""
+        getattr(self, f"_{type(skill).__name__.lower()}")(skill)
+
+    def _wait(self, skill: Wait) -> None:
+        self.tick(round(skill.seconds / TICK))
+
+    def _home(self, skill: Home) -> None:
+        self.gripper, self.grasp = [1.0, 1.0], list(AWAY)
+        self.tick()
 
     def _hit(self, skill: Hit) -> None:
         """The tool's head down on one object after the other, and up again."""
-        self._pick(Pick(skill.tool, 0.08, skill.arm))
-        arm = self._arm(skill.arm, self.poses[skill.tool].position)
+        arm = self._pick(Pick(skill.tool, 0.08, skill.arm))
         for name in skill.targets:
-            x, y, z = (self.poses[name] * self.models[name].frames["press"]).position
+            x, y, z = self.frame(name, "press").position
             tool = self.poses[skill.tool]
             dx, dy, dz = rotate(tool.rotation, self.models[skill.tool].frames["head"].position)
             self._carry(skill.tool, arm, (x - dx, y - dy, z - dz + 0.05))
@@ -138,7 +115,7 @@ class Teleport:
             self.tick(3, [Contact(name, skill.tool, (x, y, z))])
             self._carry(skill.tool, arm, (x - dx, y - dy, z - dz + 0.05))
 
-    def _raise_lower(self, skill: RaiseLower) -> None:
+    def _raiselower(self, skill: RaiseLower) -> None:
         """Up and down as often as asked, both arms at the handles, or one arm above the origin."""
         home, frames = self.poses[skill.object], self.models[skill.object].frames
         arms = {name: ARMS.index(name) for name in skill.arms}
@@ -159,9 +136,8 @@ class Teleport:
 
     def _stamp(self, skill: Stamp) -> None:
         """Down and up again as often as asked; the last time it stays there."""
-        self._pick(Pick(skill.object, 0.08, skill.arm))
-        arm = self._arm(skill.arm, self.poses[skill.object].position)
-        x, y, z = (self.poses[skill.on] * self.models[skill.on].frames["support"]).position
+        arm = self._pick(Pick(skill.object, 0.08, skill.arm))
+        x, y, z = self.frame(skill.on, "support").position
         for _ in range(skill.times):
             self._carry(skill.object, arm, (x, y, z + skill.lift))
             self._carry(skill.object, arm, (x, y, z))
@@ -169,13 +145,11 @@ class Teleport:
 
     def _dock(self, skill: Dock | Hang) -> None:
         """To the frame of the other object, turned as it is (Hang: as the object comes)."""
-        self._pick(Pick(skill.object, 0.10, skill.arm))
-        arm = self._arm(skill.arm, self.poses[skill.object].position)
-        frame = self.poses[skill.on] * self.models[skill.on].frames[skill.frame]
+        arm = self._pick(Pick(skill.object, 0.10, skill.arm))
+        frame = self.frame(skill.on, skill.frame)
         x, y, z = frame.position
         if isinstance(skill, Hang):
-            handle = self.models[skill.object].frames[skill.handle].position
-            dx, dy, dz = self.poses[skill.object].apply(handle)
+            dx, dy, dz = self.frame(skill.object, skill.handle).position
             px, py, pz = self.poses[skill.object].position
             x, y, z = x - dx + px, y - dy + py, z - dz + pz
         self._carry(skill.object, arm, (x, y, z + 0.06))
@@ -184,11 +158,13 @@ class Teleport:
             self.poses[skill.object] = frame
         self._let_go(arm)
 
+    _hang = _dock
+
     def _pour(self, skill: Pour) -> None:
         """Whatever is over the object's footprint falls into the container."""
         x, y, _ = self.poses[skill.object].position
         room = self.models[skill.object].radius
-        floor = self.poses[skill.into] * self.models[skill.into].frames["support"]
+        floor = self.frame(skill.into, "support")
         for name, pose in self.poses.items():
             near = math.dist(pose.position[:2], (x, y)) < room
             if name != skill.object and near:
@@ -201,8 +177,7 @@ class Teleport:
     def _carry(self, name: str, arm: int, to: Vec3) -> None:
         """Move a held object and the gripper around it along a straight line."""
         start = self.poses[name]
-        length = sum((b - a) ** 2 for a, b in zip(start.position, to, strict=True)) ** 0.5
-        pieces = max(1, round(length / STEP))
+        pieces = max(1, round(math.dist(start.position, to) / STEP))
         for i in range(1, pieces + 1):
             here = mix(start.position, to, i / pieces)
             self.poses[name] = Pose(here, start.rotation)
@@ -210,26 +185,25 @@ class Teleport:
             self.tick()
 
     def _press(self, skill: Press) -> None:
-        frame = self.poses[skill.object] * self.models[skill.object].frames[skill.frame]
-        arm = self._arm(skill.arm, frame.position)
-        self.gripper[arm] = 0.0
-        self.grasp[arm] = frame.position
-        self.tick(5, [Contact(skill.object, f"{ARMS[arm]}_gripper", frame.position)])
+        point = self.frame(skill.object, skill.frame).position
+        arm = self._arm(skill.arm, point)
+        self.gripper[arm], self.grasp[arm] = 0.0, point
+        self.tick(5, [Contact(skill.object, f"{ARMS[arm]}_gripper", point)])
         self.tick(10)
 
-    def _pick(self, skill: Pick) -> None:
+    def _pick(self, skill: Pick) -> int:
+        """Lift an object; returns the arm."""
         x, y, z = self.poses[skill.object].position
         arm = self._arm(skill.arm, (x, y, z))
-        self.grasp[arm] = (x, y, z + 0.02)
-        self.gripper[arm] = 0.1
+        self.grasp[arm], self.gripper[arm] = (x, y, z + 0.02), 0.1
         self.tick()
         self._carry(skill.object, arm, (x, y, z + skill.lift))
+        return arm
 
     def _place(self, skill: Place) -> None:
         goal = skill.position
         if skill.on is not None:
-            frame = self.poses[skill.on] * self.models[skill.on].frames["support"]
-            x, y, z = frame.apply(skill.position)
+            x, y, z = self.frame(skill.on, "support").apply(skill.position)
             goal = (x, y, z - self.models[skill.object].bottom)
         arm = self._arm(skill.arm, self.poses[skill.object].position)
         high = max(goal[2] + 0.07, self.poses[skill.object].position[2])
@@ -241,12 +215,11 @@ class Teleport:
         self._let_go(arm)
 
     def _drop(self, skill: Drop) -> None:
-        bin_pose, model = self.poses[skill.into], self.models[skill.into]
-        x, y, z = bin_pose.position
+        x, y, z = self.poses[skill.into].position
         arm = self._arm(skill.arm, self.poses[skill.object].position)
-        self._carry(skill.object, arm, (x, y, z + model.size[2] + skill.height))
+        self._carry(skill.object, arm, (x, y, z + self.models[skill.into].size[2] + skill.height))
         self.gripper[arm] = 1.0
-        floor = (bin_pose * model.frames["support"]).position[2]
+        floor = self.frame(skill.into, "support").position[2]
         height, speed = self.poses[skill.object].position[2], 0.0
         while height > floor:
             speed += 9.81 * TICK

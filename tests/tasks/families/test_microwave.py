@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from adversarial_cases import CHAINS, CYCLES, FREE, MEMORY, ORDERS, PICKS, PRESSES, UNDONE, Case
+from adversarial_cases import CASES, Case
 from drawn_scenes import at, each_task, kept, many
 from hands import Hands
 from official_limits import LIMITS, Limit
@@ -59,7 +59,6 @@ def test_a_thing_that_is_held_there_does_not_count() -> None:
 # --- rules and their loopholes: a hundred cases, every official number, everything that can be held
 
 
-CASES = (*PRESSES, *CYCLES, *ORDERS, *FREE, *MEMORY, *CHAINS, *PICKS, *UNDONE)
 SEED, STEP = 100_000, 3e-4
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "fidelity.md"
 scene_of = cache(build_scene)
