@@ -1,10 +1,15 @@
 """What all tests share: processes that they start find the modules of `tests/helpers` too."""
 
+import hashlib
 import os
+import pickle
 import re
+import shutil
 import socketserver
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 from xdist.scheduler import LoadFileScheduling
@@ -13,6 +18,8 @@ from robospa.tasks import catalog
 
 TASKS = re.compile("|".join(sorted(catalog.tasks(), key=len, reverse=True)), re.IGNORECASE)
 
+PAGES = ("robospa.leaderboard.site.draw", "robospa.results.report.report.draw")
+"""What draws the figures of pages."""
 HELPERS = Path(__file__).resolve().parent / "helpers"
 LONG = (
     "test_soak",
@@ -92,17 +99,44 @@ def drawn_figures(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def same_figures_once(monkeypatch: pytest.MonkeyPatch, drawn_figures: Path) -> None:
-    """The test's pages get figures that an earlier one has drawn of the same values."""
-    from kept_figures import keep_figures
+    """The test's pages get figures that an earlier one has drawn of the same values, and only those
+    that they show: files for papers are empty.
 
-    keep_figures(monkeypatch, drawn_figures)
+    A set of figures costs one to three seconds, and the same values make the same bytes in all
+    formats (`tests/results/figures/test_figures.py` holds that).
+    """
+    from robospa.results.figures.draw import draw
+    from robospa.results.figures.series import FORMATS
+
+    def kept(
+        all_series: Sequence[Any],
+        folder: Path,
+        formats: Sequence[str] = FORMATS,
+        beside: Sequence[Any] = (),
+    ) -> Any:
+        values = pickle.dumps((list(all_series), tuple(formats), list(beside)))
+        drawn = drawn_figures / hashlib.sha256(values).hexdigest()
+        if not (drawn / "drawings").exists():
+            drawn.mkdir(parents=True, exist_ok=True)
+            made = draw(all_series, drawn, ("svg",), beside)
+            for ending in set(formats) - {"svg"}:
+                for drawing in made:
+                    (drawn / f"{drawing.name}.{ending}").touch()
+            (drawn / "drawings").write_bytes(pickle.dumps(made))
+        for path in drawn.iterdir():
+            if path.name != "drawings":
+                shutil.copyfile(path, folder / path.name)
+        return pickle.loads((drawn / "drawings").read_bytes())
+
+    for page in PAGES:
+        monkeypatch.setattr(page, kept)
 
 
 @pytest.fixture
 def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages without pictures."""
-    for page in ("results.report.report", "leaderboard.site"):
-        monkeypatch.setattr(f"robospa.{page}.draw", lambda *given: [])
+    for page in PAGES:
+        monkeypatch.setattr(page, lambda *given: [])
 
 
 @pytest.fixture

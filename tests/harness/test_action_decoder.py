@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from run_fakes import FakePolicy, FakeWorld, parts
-from unequal_arms import unequal_arms
-from world_scenes import READY, joint_action
+from world_scenes import READY, joint_action, unequal_arms
 
 from robospa.action_space import STEPS_PER_UNIT, is_quantized, quantize
 from robospa.harness import action_decoder

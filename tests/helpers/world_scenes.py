@@ -1,11 +1,14 @@
-"""Small scenes of blocks for the tests of the world."""
+"""Small scenes of blocks for the tests of the world, and a robot with arms of two kinds."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robospa.geometry import Pose
+from robospa.harness.robots import embodiment
+from robospa.harness.robots.embodiment import Embodiment
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot
 from robospa.workcell import TABLE_TOP
@@ -58,3 +61,26 @@ def run_digest(world: Any, loaded: Scene, seed: int, actions: int = 4) -> str:
     for action in wandering(actions, seed):
         world.step(action, "joint", go_on)
     return str(world.digest())
+
+
+def unequal_arms() -> Embodiment:
+    """The default robot, but with a seventh joint between its right arm and gripper."""
+    robot = embodiment("aloha-agilex")
+    left, right = robot.arms
+    last = right.joints[-1]
+    extra = replace(last, name="extra", parent=last.child, child="extra_link", origin=Pose())
+    fingers = tuple(
+        replace(finger, parent=extra.child) if finger.parent == last.child else finger
+        for finger in right.fingers
+    )
+    right = replace(
+        right,
+        joints=(*right.joints, extra),
+        fingers=fingers,
+        home=(*right.home, 0.0),
+        seeds=tuple((*seed, 0.0) for seed in right.seeds),
+        shapes={**right.shapes, extra.child: ()},
+        working=(*right.working, right.working[-1]),
+        geometry="any",
+    )
+    return replace(robot, arms=(left, right))

@@ -1,19 +1,22 @@
 """The same motions in every action space, and actions that no robot could follow."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from disguised_oracle import Disguised
 from numpy.typing import NDArray
 from run_fakes import FakeWorld, parts
-from unequal_arms import READY, unequal_arms
-from world_scenes import go_on
+from world_scenes import READY, go_on, unequal_arms
 
 from robospa.action_space import is_quantized
+from robospa.baselines.oracle import Oracle
+from robospa.geometry import Pose
 from robospa.harness import action_decoder
 from robospa.harness.replay import replay
+from robospa.harness.robots import embodiment
+from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.running.record_store import ActionRecorder
 from robospa.harness.sim import sapien_world
 from robospa.harness.sim.sapien_world import SapienWorld
@@ -24,6 +27,41 @@ from robospa.tasks.catalog import build_scene
 from robospa.trial import TrialKey
 
 pytestmark = pytest.mark.sim
+CHAINS = [chain_of(arm) for arm in embodiment("aloha-agilex").arms]
+
+
+def tools(row: NDArray[np.float32]) -> list[tuple[Pose, float]]:
+    """End-effector pose and gripper of both arms after one joint action."""
+    parts = (row[:7], row[7:])
+    return [
+        (end_effector(chain, part[:6].tolist()), float(part[6]))
+        for chain, part in zip(CHAINS, parts, strict=True)
+    ]
+
+
+class Disguised:
+    """The oracle in disguise: its motions, sent as end-effector poses or as changes of them."""
+
+    def __init__(self, space: str) -> None:
+        self._oracle = Oracle()
+        self.spec = replace(self._oracle.spec, action=space)
+        self._last: list[tuple[Pose, float]] = []
+
+    def reset(self, trial: TrialInfo) -> None:
+        self._oracle.reset(trial)
+        self._last = tools(np.zeros(14, np.float32))
+
+    def infer(self, observation: dict[str, Any]) -> NDArray[np.float32]:
+        rows = []
+        for row in self._oracle.infer(observation):
+            now = tools(row)
+            numbers: list[float] = []
+            for (pose, gripper), (before, _) in zip(now, self._last, strict=True):
+                sent = pose if self.spec.action == "ee" else before.inverse() * pose
+                numbers += [*sent.position, *sent.rotation, gripper]
+            self._last = now
+            rows.append(numbers)
+        return np.array(rows, np.float32)
 
 
 def test_a_robot_whose_arms_have_different_joint_counts(monkeypatch: pytest.MonkeyPatch) -> None:
