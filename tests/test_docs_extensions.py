@@ -3,7 +3,6 @@ of an installed package and run whole."""
 
 import re
 import sys
-import threading
 import tomllib
 from collections.abc import Iterator
 from http.server import ThreadingHTTPServer
@@ -16,6 +15,7 @@ import pytest
 from command_line import robospa
 from installed import EXAMPLES, installed
 from standins import QUICK, STATE, TRIAL, observation
+from wire_helpers import serving
 
 from robospa.clients import check_options, connect
 from robospa.clients.dialect import dialects
@@ -255,12 +255,8 @@ def acme(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     monkeypatch.syspath_prepend(folder)
     server = ThreadingHTTPServer(("127.0.0.1", 0), import_module("acme_server").Acme)
     server.daemon_threads = True
-    thread = threading.Thread(target=server.serve_forever, daemon=True)
-    thread.start()
-    yield f"acme+http://127.0.0.1:{server.server_port}"
-    server.shutdown()
-    thread.join(5)
-    server.server_close()
+    with serving(server):
+        yield f"acme+http://127.0.0.1:{server.server_port}"
 
 
 def test_a_policy_behind_the_dialect_answers_in_our_units(acme: str) -> None:

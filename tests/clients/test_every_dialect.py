@@ -1,7 +1,6 @@
 """What must go right and wrong in the same way in every dialect."""
 
 import socket
-import threading
 from collections.abc import Callable
 from http.server import HTTPServer, SimpleHTTPRequestHandler
 from typing import Any
@@ -10,6 +9,7 @@ import numpy as np
 import pytest
 from run_fakes import FakePolicy
 from standins import DIALECTS, QUICK, TRIAL, answered, joint_chunk, observation, talking
+from wire_helpers import serving
 
 from robospa.clients import connect, dialect
 from robospa.clients.dialect import dialects
@@ -202,14 +202,11 @@ def test_an_http_server_of_another_kind() -> None:
         def do_GET(self) -> None:
             self.send_error(404)
 
-    with HTTPServer(("127.0.0.1", 0), Quiet) as server:
-        thread = threading.Thread(target=server.serve_forever, daemon=True)
-        thread.start()
+    server = HTTPServer(("127.0.0.1", 0), Quiet)
+    with serving(server):
         for scheme in ("go1+http", "xvla+http", "openpi", "ws", "vla-eval"):
             with pytest.raises(HandshakeError, match="an HTTP server of another kind"):
                 connect(f"{scheme}://127.0.0.1:{server.server_port}", timeouts=HASTY)
-        server.shutdown()
-        thread.join(5)
 
 
 @pytest.mark.parametrize("scheme", ["ws", "openpi"])

@@ -17,12 +17,12 @@ import msgpack
 import numpy as np
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import serve
+from wire_helpers import QUICK, serving
 
 from robospa.clients import connect
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.transport import Timeouts
 
-QUICK = Timeouts(connect=10, hello=10, reset=10, first_infer=10, infer=10, end=10, close=0.2)
 TRIAL = TrialInfo("Pick_Blocks_Size", "aloha-agilex", "pick the red block", 7, "5eed")
 HEAD, LEFT, RIGHT = "head", "left_wrist", "right_wrist"
 
@@ -75,22 +75,17 @@ class StandIn:
         self.extra: dict[str, Any] = {}
         self.requests: list[Any] = []
         self.port = 0
-        self._stop: list[Callable[[], Any]] = []
+        self._over = contextlib.ExitStack()
 
     def _run(self, server: Any) -> None:
-        thread = threading.Thread(target=server.serve_forever, daemon=True)
-        thread.start()
-        self._stop = [server.shutdown, lambda: thread.join(5)]
-        if hasattr(server, "server_close"):
-            self._stop.append(server.server_close)
+        self._over.enter_context(serving(server))
 
     def __enter__(self) -> str:
         self.listen()
         return f"{self.scheme}://127.0.0.1:{self.port}"
 
     def __exit__(self, *_: object) -> None:
-        for stop in self._stop:
-            stop()
+        self._over.close()
 
     def listen(self) -> None:
         raise NotImplementedError
@@ -152,11 +147,6 @@ class Status(Exception):
         self.status, self.body = status, body
 
 
-def strict_json(value: Any) -> bytes:
-    """As FastAPI writes it: NaN and infinity are a ValueError."""
-    return json.dumps(value, allow_nan=False).encode()
-
-
 class Fast(StandIn):
     """The outside of a FastAPI application with one endpoint, POST /act."""
 
@@ -209,6 +199,13 @@ class Fast(StandIn):
     def act(self, body: bytes) -> Any:
         raise NotImplementedError
 
+    def said(self, seen: Any, write: Callable[[Any], Any]) -> Any:
+        """The answer to an observation, as FastAPI writes it: NaN is a ValueError."""
+        self.requests.append(seen)
+        if self.instead is not None:
+            return self.instead
+        return json.dumps(write(self.model(seen)), allow_nan=False).encode()
+
 
 class Go1(Fast):
     """GO-1's deploy.py: arrays nested in the body, any failure a bare 500."""
@@ -220,10 +217,7 @@ class Go1(Fast):
             seen = json.loads(body, object_hook=json_numpy)
             seen["state"].copy().shape, seen["ctrl_freqs"].copy().shape
             assert isinstance(seen["state"], np.ndarray), "a list has no shape"
-            self.requests.append(seen)
-            if self.instead is not None:
-                return self.instead
-            return strict_json(np.asarray(self.model(seen)).tolist())
+            return self.said(seen, lambda rows: np.asarray(rows).tolist())
         except Exception as error:
             raise Status(500, b"Internal Server Error") from error
 
@@ -238,11 +232,7 @@ class Oft(Fast):
             seen = json.loads(body, object_hook=json_numpy)
             assert seen["full_image"].shape == (240, 320, 3) and seen["instruction"].lower()
             seen["wrists"] = [seen[name] for name in seen if "wrist" in name]
-            self.requests.append(seen)
-            if self.instead is not None:
-                return self.instead
-            rows = self.model(seen)
-            return json.dumps([array_object(np.asarray(row)) for row in rows]).encode()
+            return self.said(seen, lambda rows: [array_object(np.asarray(row)) for row in rows])
         except Exception:
             return "error"
 
@@ -273,10 +263,7 @@ class XVla(Fast):
             assert 0 <= seen["domain_id"] < 30
             assert seen["proprio"].dtype.kind == "f"
             assert seen["proprio"].shape == (self.proprio,)
-            self.requests.append(seen)
-            if self.instead is not None:
-                return self.instead
-            return strict_json({"action": np.asarray(self.model(seen)).tolist(), **self.extra})
+            return self.said(seen, lambda rows: {"action": np.asarray(rows).tolist(), **self.extra})
         except Status:
             raise
         except Exception as error:
@@ -559,7 +546,8 @@ class Gr00t(StandIn):
 
         thread = threading.Thread(target=work, daemon=True)
         thread.start()
-        self._stop = [over.set, lambda: thread.join(5), lambda: context.destroy(linger=0)]
+        for stop in (lambda: context.destroy(linger=0), lambda: thread.join(5), over.set):
+            self._over.callback(stop)  # the last one first
 
     @staticmethod
     def read(value: Any) -> Any:

@@ -94,42 +94,49 @@ def observation(step: int = 0, **changes: Any) -> dict[str, Any]:
     return {**seen, **changes}
 
 
-class Scripted:
+@contextlib.contextmanager
+def serving(server: Any) -> Iterator[None]:
+    """Until the end a server with `serve_forever` and `shutdown` listens."""
+    thread = threading.Thread(target=server.serve_forever, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        server.shutdown()
+        thread.join(5)
+        if hasattr(server, "server_close"):
+            server.server_close()
+
+
+@contextlib.contextmanager
+def scripted(greeting: Any, answers: Sequence[Any] = ()) -> Iterator[str]:
     """A server that sends prepared frames: each of `answers` is a frame, or a function of the
     request's bytes. `greeting` is sent first. Frames of type str go out as text."""
 
-    def __init__(self, greeting: Any, answers: Sequence[Any] = (), v1: bool = True) -> None:
-        def handler(peer: Any) -> None:
-            if greeting is not None:
-                peer.send(greeting)
-            for answer in answers:
-                request = peer.recv()
-                frame = answer(request) if callable(answer) else answer
-                if frame is None:
-                    return
-                peer.send(frame)
-            with contextlib.suppress(Exception):
-                peer.recv()
+    def handler(peer: Any) -> None:
+        if greeting is not None:
+            peer.send(greeting)
+        for answer in answers:
+            request = peer.recv()
+            frame = answer(request) if callable(answer) else answer
+            if frame is None:
+                return
+            peer.send(frame)
+        with contextlib.suppress(Exception):
+            peer.recv()
 
-        self._server = serve(
-            handler,
-            "127.0.0.1",
-            0,
-            select_subprotocol=lambda _, offered: offered[0] if v1 and offered else None,
-            compression=None,
-            max_size=None,
-            max_queue=1,
-            close_timeout=0.2,
-        )
-        self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
-
-    def __enter__(self) -> str:
-        self._thread.start()
-        return f"ws://127.0.0.1:{self._server.socket.getsockname()[1]}"
-
-    def __exit__(self, *_: object) -> None:
-        self._server.shutdown()
-        self._thread.join(5)
+    server = serve(
+        handler,
+        "127.0.0.1",
+        0,
+        select_subprotocol=lambda _, offered: offered[0] if offered else None,
+        compression=None,
+        max_size=None,
+        max_queue=1,
+        close_timeout=0.2,
+    )
+    with serving(server):
+        yield f"ws://127.0.0.1:{server.socket.getsockname()[1]}"
 
 
 def self_signed(tmp_path: Path) -> tuple[ssl.SSLContext, ssl.SSLContext]:
@@ -153,7 +160,7 @@ HELLO = pack(Hello(0, "1.1", "scripted", SPEC))
 
 
 def answer(make: Any) -> Any:
-    """A frame for `Scripted` from a function of the request's id."""
+    """A frame for `scripted` from a function of the request's id."""
     return lambda request: pack(make(unpack(request).id))
 
 

@@ -6,7 +6,6 @@ import re
 import shutil
 import subprocess
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from typing import Any
 import pytest
 from bundle_fakes import CARD_TEXT as CARD
 from bundle_fakes import FAKES, PICK, SEEDS, make_run, unzip
+from wire_helpers import serving
 
 from robospa.leaderboard import pull_request
 from robospa.leaderboard.bundle import BundleError
@@ -216,12 +216,9 @@ class Files(http.server.BaseHTTPRequestHandler):
 
 @pytest.fixture
 def site() -> Iterator[str]:
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Files) as server:
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Files)
+    with serving(server):
         yield f"http://127.0.0.1:{server.server_address[1]}"
-        server.shutdown()
-        thread.join()
 
 
 def test_a_download_has_the_announced_size(site: str, tmp_path: Path) -> None:

@@ -15,11 +15,11 @@ from wire_helpers import (
     SPEC,
     TRIAL,
     Recall,
-    Scripted,
     answer,
     begun,
     observation,
     port_that,
+    scripted,
 )
 
 from robospa.protocol.client import connect
@@ -131,7 +131,7 @@ def test_what_is_no_websocket_url(url: str) -> None:
     ],
 )
 def test_a_wrong_greeting(greeting: Any, error: type[Exception]) -> None:
-    with Scripted(greeting) as url, pytest.raises(error):
+    with scripted(greeting) as url, pytest.raises(error):
         connect(url, timeouts=replace(QUICK, hello=0.3))
 
 
@@ -147,7 +147,7 @@ def test_a_wrong_greeting(greeting: Any, error: type[Exception]) -> None:
     ],
 )
 def test_an_answer_that_ends_the_connection(answer_: Any, error: Any, words: str) -> None:
-    with Scripted(HELLO, [READY, answer_, READY]) as url:
+    with scripted(HELLO, [READY, answer_, READY]) as url:
         remote = connect(url, timeouts=QUICK, limits=Limits(message=5000))
         remote.reset(TRIAL)
         with pytest.raises(error, match=words):
@@ -163,7 +163,7 @@ def test_a_late_answer_is_never_taken_for_the_next_one() -> None:
         given_up.wait(10)
         return bytes(actions(CHUNK)(request))
 
-    with Scripted(HELLO, [READY, slow, actions(CHUNK)]) as url:
+    with scripted(HELLO, [READY, slow, actions(CHUNK)]) as url:
         remote = connect(url, timeouts=replace(QUICK, first_infer=0.1))
         remote.reset(TRIAL)
         with pytest.raises(CallTimeout, match=r"within 0\.1 s"):
@@ -207,7 +207,7 @@ def test_only_the_first_call_of_a_task_may_be_slow(
     ],
 )
 def test_a_bad_chunk_is_the_policys_fault_and_spares_the_connection(chunk: Any) -> None:
-    with Scripted(HELLO, [READY, actions(chunk), READY]) as url:
+    with scripted(HELLO, [READY, actions(chunk), READY]) as url:
         remote = connect(url, timeouts=QUICK)
         remote.reset(TRIAL)
         with pytest.raises(PolicyAnswerError):
@@ -251,7 +251,7 @@ def test_large_messages_arrive_whole(start: Any) -> None:
 
 def test_a_server_that_stops_reading_is_given_up() -> None:
     given_up = threading.Event()
-    with Scripted(HELLO, [lambda _: (given_up.wait(20), None)[1]]) as url:
+    with scripted(HELLO, [lambda _: (given_up.wait(20), None)[1]]) as url:
         transport = Transport(Address(url), replace(QUICK, first_infer=0.2, infer=0.2))
         with pytest.raises(TransportError):
             for _ in range(9):

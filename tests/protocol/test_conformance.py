@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from wire_helpers import QUICK, SPEC, Recall, Scripted, answer
+from wire_helpers import QUICK, SPEC, Recall, answer, scripted
 
 from robospa.observation import CameraSpec
 from robospa.protocol.conformance import CHECKS, check, synthetic_observation, trial_for
@@ -43,7 +43,7 @@ def test_nobody_there() -> None:
 
 
 def test_a_server_of_another_version() -> None:
-    with Scripted(pack(Hello(0, "99.0", "s", SPEC))) as url:
+    with scripted(pack(Hello(0, "99.0", "s", SPEC))) as url:
         results = check(url, timeouts=QUICK)
     assert [(r.name, r.passed) for r in results] == [("handshake", False)]
     assert "99.0" in results[0].detail
@@ -84,7 +84,7 @@ def test_state_that_is_kept_over_trials(start: Any, seeded: bool, passed: bool |
 def test_a_server_that_takes_any_order() -> None:
     zeros = np.zeros((2, 14), np.float32)
     careless = [answer(lambda id: Actions(id, zeros)), answer(Ready)] * 2
-    with Scripted(pack(Hello(0, "1.1", "s", SPEC)), careless) as url:
+    with scripted(pack(Hello(0, "1.1", "s", SPEC)), careless) as url:
         assert verdicts(url)["requests in order"] is False
 
 

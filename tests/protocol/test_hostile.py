@@ -31,6 +31,7 @@ from wire_helpers import (
     observation,
     raw,
     self_signed,
+    serving,
     until,
 )
 
@@ -427,13 +428,8 @@ def redirecting(location: str) -> Iterator[tuple[str, list[Request]]]:
         return Response(302, "Found", Headers({"Location": location, "Content-Length": "0"}), b"")
 
     server = serve(lambda connection: None, "127.0.0.1", 0, process_request=answer)
-    thread = threading.Thread(target=server.serve_forever, daemon=True)
-    thread.start()
-    try:
+    with serving(server):
         yield f"ws://127.0.0.1:{server.socket.getsockname()[1]}", asked
-    finally:
-        server.shutdown()
-        thread.join(5)
 
 
 def test_another_host_is_not_followed_and_gets_no_token() -> None:
