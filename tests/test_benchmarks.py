@@ -1,6 +1,6 @@
 """The results of benchmarks have one form, and their page says what they say."""
 
-import importlib.util
+import importlib
 import json
 import sys
 from collections.abc import Iterator
@@ -13,13 +13,10 @@ FOLDER = Path(__file__).resolve().parents[1] / "benchmarks"
 
 
 @pytest.fixture
-def frame() -> Iterator[Any]:
+def frame(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     """The module `frame` of benchmarks/, where scripts import each other by name."""
-    spec = importlib.util.spec_from_file_location("frame", FOLDER / "frame.py")
-    assert spec is not None and spec.loader is not None
-    sys.modules["frame"] = module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    yield module
+    monkeypatch.syspath_prepend(FOLDER)
+    yield importlib.import_module("frame")
     del sys.modules["frame"]
 
 

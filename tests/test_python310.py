@@ -57,10 +57,10 @@ def test_the_check_sees_newer_names() -> None:
 
 def test_it_imports_on_python_310_where_there_is_one() -> None:
     python = os.environ.get("ROBOSPA_PYTHON310") or shutil.which("python3.10")
-    if python is None or not _usable(python):
-        pytest.skip(
-            "no Python 3.10 with numpy, msgpack, msgspec, websockets, typer (ROBOSPA_PYTHON310)"
-        )
+    needs = "numpy, msgpack, msgspec, websockets, typer"
+    check = f"import sys, {needs}; sys.exit(sys.version_info[:2] != (3, 10))"
+    if python is None or subprocess.run([python, "-c", check], capture_output=True).returncode:
+        pytest.skip(f"no Python 3.10 with {needs} (ROBOSPA_PYTHON310)")
     code = (
         "from robospa.clients import go1, lerobot, rdt, xvla\n"
         "from robospa.clients import openpi\n"
@@ -80,12 +80,3 @@ def test_it_imports_on_python_310_where_there_is_one() -> None:
         [python, "-c", code], capture_output=True, text=True, timeout=60, env=environment
     )
     assert done.stdout.strip() == "(10, 14)", done.stderr
-
-
-def _usable(python: str) -> bool:
-    code = (
-        "import sys, numpy, msgpack, msgspec, websockets, typer\n"
-        "sys.exit(sys.version_info[:2] != (3, 10))"
-    )
-    done = subprocess.run([python, "-c", code], capture_output=True, timeout=60)
-    return done.returncode == 0

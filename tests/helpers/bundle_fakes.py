@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from msgspec import to_builtins
-from run_fakes import LIMIT, FakePolicy, FakeWorld, parts
+from run_fakes import FakePolicy, FakeWorld, parts
 
 from robospa.harness.running.manifest import about_machine, write_manifest
 from robospa.harness.running.record_store import ActionRecorder, RecordWriter, write_actions
@@ -129,9 +129,8 @@ def make_run(
     keys: Sequence[TrialKey] = (),
     policy: FakePolicy | None = None,
     change: Callable[[dict[str, Any], dict[str, Any]], None] = lambda settings, about: None,
-    skip: int = 0,
 ) -> Path:
-    """A run of `keys` in the fake world, without its last `skip` trials."""
+    """A run of `keys` in the fake world."""
     keys, policy, world = list(keys) or all_keys(), policy or Weak(), World()
     settings: dict[str, Any] = {
         "embodiment": ("aloha-agilex",),
@@ -148,7 +147,7 @@ def make_run(
     settled, told = convert(settings, RunSettings), convert(about, RunAbout)
     write_manifest(folder, make_manifest(settled, keys, told, categories, SUITE))
     writer = RecordWriter(folder)
-    for key in keys[: len(keys) - skip]:
+    for key in keys:
         recorder = ActionRecorder()
         record = run_trial(
             world, policy, key, policy_seed=policy_seed(key, 0), recorder=recorder, parts=parts
@@ -250,6 +249,3 @@ def edit_row(files: Files, place: int, change: Callable[[Any], None]) -> None:
     rows = rows_of(files)
     change(rows[place])
     put_rows(files, rows)
-
-
-__all__ = ["LIMIT"]

@@ -1,7 +1,7 @@
 """A small made-up checkout of RoboSPA: the folders and keys of the official one, our own words."""
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 TEMPLATES: Mapping[tuple[str, int], tuple[Sequence[str], Sequence[str]]] = {
@@ -27,16 +27,12 @@ MODELS = {
 }
 
 
-def write_checkout(
-    folder: Path, variants: Iterable[tuple[str, int]] = TEMPLATES, models: Iterable[str] = MODELS
-) -> Path:
-    """Write the sentences of `variants` and the descriptions of `models` below `folder`."""
-    for task, level in variants:
-        seen, unseen = TEMPLATES[(task, level)]
+def write_checkout(folder: Path) -> Path:
+    """Write the sentences and the descriptions of models below `folder`."""
+    for (task, level), (seen, unseen) in TEMPLATES.items():
         path = folder / "description" / "task_instruction" / f"{task}_{level}.json"
         _write(path, {"full_description": "made up", "seen": seen, "unseen": unseen})
-    for model in models:
-        plain, seen, unseen = MODELS[model]
+    for model, (plain, seen, unseen) in MODELS.items():
         path = folder / "description" / "objects_description" / f"{model}.json"
         _write(path, {"raw_description": plain, "seen": seen, "unseen": unseen})
     return folder

@@ -23,6 +23,10 @@ COLORS = {"head": (200, 30, 40), "left_wrist": (20, 190, 60), "right_wrist": (50
 """The colour that fills each camera's image."""
 
 
+OTHERS = ("randint", "bernoulli", "multinomial", "randn_like", "rand_like", "normal")
+"""Random functions of torch that no server calls."""
+
+
 class Tensor(np.ndarray):
     """An array with the methods of a tensor that are called."""
 
@@ -38,8 +42,7 @@ class Tensor(np.ndarray):
     def cpu(self) -> Tensor:
         return self
 
-    def detach(self) -> Tensor:
-        return self
+    detach = cpu
 
     def numpy(self) -> Any:
         return np.asarray(self)
@@ -120,13 +123,8 @@ def fake_torch() -> Any:
         "Generator": Generator,
         "randn": random("standard_normal"),
         "rand": random("random"),
-        "randint": object(),
         "randperm": random("random"),
-        "bernoulli": object(),
-        "multinomial": object(),
-        "randn_like": object(),
-        "rand_like": object(),
-        "normal": object(),
+        **dict.fromkeys(OTHERS, object()),
         "manual_seed": lambda seed: everyone.manual_seed(seed),
         "overrides": types.SimpleNamespace(TorchFunctionMode=Mode),
         "get_default_dtype": lambda: np.float32,

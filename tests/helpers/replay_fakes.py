@@ -112,10 +112,10 @@ def columns(order: list[int]) -> Change:
     return lambda chunk, now: chunk[:, order]
 
 
-def grippers(change: Callable[[Array], Array], at: tuple[int, ...] = (6, 13)) -> Change:
+def grippers(change: Callable[[Array], Array]) -> Change:
     def changed(chunk: Array, now: Array) -> Array:
         out = chunk.copy()
-        out[:, at] = change(out[:, at])
+        out[:, [6, 13]] = change(out[:, [6, 13]])
         return out
 
     return changed

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from bundle_fakes import CARD_DATA, REFERENCE, Weak, make_run
+from fake_runs import record
 from run_fakes import FakePolicy
 
 from robospa.leaderboard.bundle import canonical
@@ -18,10 +19,8 @@ from robospa.leaderboard.submission import add
 from robospa.leaderboard.verify import Valid
 from robospa.results.paper.columns import Column
 from robospa.results.paper.published import LEVELS, load
-from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.models import ModelResults, Setting
 from robospa.results.scoring.scores import combine, score_cell
-from robospa.trial import TrialKey
 
 REPLAYED: dict[str, Any] = {
     "challenge": "0123456789abcdef",
@@ -82,8 +81,10 @@ def _random_entry(model: Entry, number: int) -> Entry:
         for level in LEVELS:
             count = task.counts[level - 1]
             good = rng.random(20) < skill * (1.1 - 0.15 * level)
-            records = [_record(task.name, task.category, level, n, g, count)
-                       for n, g in enumerate(good)]  # fmt: skip
+            records = [
+                record(task.name, level, n, int(g) * count, count, category=task.category)
+                for n, g in enumerate(good)
+            ]
             cells[task.name, level] = score_cell(task.name, level, task.category, 20, records)
     name = f"Model {number}"
     mode = ("clean", "randomised")[number % 2]
@@ -98,13 +99,6 @@ def _random_entry(model: Entry, number: int) -> Entry:
         column=column,
         cells=tuple(f"{row}/{n}" for row in page_values(model)["sr"] for n in (0, *LEVELS)),
     )
-
-
-def _record(task: str, category: str, level: int, seed: int, good: bool, count: int) -> TrialRecord:
-    done, key = int(good) * count, TrialKey(task, level, seed)
-    end = "success" if good else "step_limit"
-    numbers = (done, done, count, count, 10, 500, 2)
-    return TrialRecord(key, category, "take it", "s", end, bool(good), *numbers, "d", "a", 2.0)
 
 
 def change(path: Path, edit: Any) -> None:

@@ -55,10 +55,10 @@ def go_on(snapshot: Snapshot) -> bool:
     return False
 
 
-def run_digest(world: Any, loaded: Scene, seed: int, actions: int = 4) -> str:
+def run_digest(world: Any, loaded: Scene, seed: int) -> str:
     """Load, wander, hash."""
     world.load(loaded)
-    for action in wandering(actions, seed):
+    for action in wandering(4, seed):
         world.step(action, "joint", go_on)
     return str(world.digest())
 

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from made_archive import READS_MESHES, SCALE, make_archive, official_pack_in
-from made_robots import make_robot
+from made_archive import READS_MESHES, SCALE, make_archive, make_robot, official_pack_in
 from mesh_writers import Piece, empty_png, glb, glb_bytes, write_glb, write_obj, write_textured_obj
 
 from robospa.baselines.oracle import Oracle

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_archive import READS_MESHES
-from made_robots import MOVED, make_robot
+from made_archive import MOVED, READS_MESHES, make_robot
 
 from robospa.harness.official.layout import check_robots
 from robospa.harness.packs import archive as cache
