@@ -12,7 +12,7 @@ import typer
 
 from robospa.harness.cli.options import SEED, TRIALS, AsJson, aside, print_json, with_flags
 from robospa.harness.datasets.settings import Collection
-from robospa.harness.datasets.workers import MakerError
+from robospa.harness.datasets.workers import MakerError, pool_opener
 from robospa.harness.running.atomic_file import StorageError
 from robospa.harness.running.status import cores
 from robospa.harness.settings import Compute, SettingsError
@@ -120,10 +120,13 @@ def collect(
 
     order = collecting.Order(_group(Collection, given), layout, out)
     again = f"the same command with --out {out} --resume goes on from here"
-    with resumable("the collection", again, (MakerError, StorageError)):
-        result = collecting.collect_order(
+    with (
+        resumable("the collection", again, (MakerError, StorageError)),
+        pool_opener(_group(Compute, given)) as open_pool,
+    ):
+        result = collecting.make(
             order,
-            _group(Compute, given),
+            open_pool,
             resume=resume,
             keep_episodes=keep_episodes,
             say=aside if as_json else print,

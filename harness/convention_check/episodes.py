@@ -11,7 +11,6 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -187,7 +186,7 @@ def _read(file: h5py.File, path: Path, instruction: str | None) -> Episode:
     if not about and len(path.absolute().parents) > 2:  # <task>/<configuration>/data/episode0.hdf5
         about = {"task": path.absolute().parents[2].name}
     text = instruction or str(_plain(file.attrs.get("instruction", "")))
-    text = text or _official_instruction(path)
+    text = text or next(iter(seen_sentences(path)), "")
     return Episode(name, commanded, np.stack(arms, axis=1), frames, space, text, measured, about)
 
 
@@ -246,12 +245,15 @@ def _plain(value: object) -> str | int:
     return plain if isinstance(plain, int) else str(plain)
 
 
-def _official_instruction(path: Path) -> str:
-    """The first training instruction that official data keep beside an episode, or nothing."""
+def seen_sentences(path: Path) -> tuple[str, ...]:
+    """The distinct training sentences that official data keep beside the episode at `path`, if
+    there are any; those of `unseen` are left where they are."""
     at = path.absolute().parent.parent / "instructions" / f"{path.stem}.json"
-    with suppress(OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
-        return str(json.loads(text_beside(at))["seen"][0])
-    return ""
+    try:
+        listed = json.loads(text_beside(at))["seen"]
+        return tuple(dict.fromkeys(text for text in listed if isinstance(text, str) and text))
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+        return ()
 
 
 def text_beside(path: Path, most: int = MOST_TEXT) -> str:

@@ -17,7 +17,6 @@ import time
 import zipfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future
 from dataclasses import asdict, dataclass, field, fields
 from functools import partial
 from itertools import starmap
@@ -45,7 +44,7 @@ from robospa.harness.settings import Compute, SettingsError, changed
 from robospa.registry import did_you_mean
 from robospa.results.records.runs import LOCK
 from robospa.tasks.seeds import FIRST_TRAINING_SEED, ListKey
-from robospa.text import clock_text, size_text
+from robospa.text import clock_text, counted, size_text
 from robospa.trial import path_part
 
 EPISODES, SETTINGS = "episodes", "settings.json"
@@ -275,20 +274,8 @@ def collect(
     )
     compute = changed(Compute(), Compute, machine)
     order = Order(changed(Collection(), Collection, own), format, Path(out))
-    return collect_order(order, compute, resume=resume)
-
-
-def collect_order(
-    order: Order,
-    compute: Compute,
-    *,
-    resume: bool = False,
-    keep_episodes: bool = False,
-    say: Callable[[str], None] = print,
-) -> CollectionResult | None:
-    """Make the data set of `order` with the workers that `compute` asks for, as `collect`."""
     with pool_opener(compute) as open_pool:
-        return make(order, open_pool, resume=resume, keep_episodes=keep_episodes, say=say)
+        return make(order, open_pool, resume=resume)
 
 
 def make(
@@ -371,8 +358,7 @@ def _say_size(
     whole = expected_bytes(order.settings, keys, order.images)
     text = check_room(order.out, max(0.0, whole - store.size() / 2))
     episodes = order.settings.episodes * len(keys)
-    variants = "1 variant" if len(keys) == 1 else f"{len(keys)} variants"
-    say(f"{episodes} episodes of {variants}: {text}")
+    say(f"{episodes} episodes of {counted(len(keys), 'variant')}: {text}")
 
 
 def _make_episodes(
@@ -401,11 +387,8 @@ def _make_episodes(
         search.attempts[item.seed] = store.add(search.key, item)
         progress.add(item, frames(search.key))
 
-    def submit(key: ListKey, seed: int) -> Future[Attempt]:
-        return pool.submit(order.job(key, seed))
-
     with open_pool(left) as pool, progress:
-        for search in sweep(submit, pool.workers, wanted, note):
+        for search in sweep(lambda *of: pool.submit(order.job(*of)), pool.workers, wanted, note):
             if search.given_up:
                 lacking = count - len(search.accepted)
                 progress.give_up(lacking, lacking * frames(search.key))

@@ -8,7 +8,6 @@ What they do not hold (`ABSENT`) is left out of the data set, and its card says 
 scenes nobody can play them again, so verification looks at hashes and counts alone.
 """
 
-import json
 import shlex
 import shutil
 from collections import Counter
@@ -26,7 +25,7 @@ from robospa.harness.convention_check.episodes import (
     Episode,
     EpisodeError,
     read_episode,
-    text_beside,
+    seen_sentences,
 )
 from robospa.harness.datasets.episode import DatasetEpisode, Pictures
 from robospa.harness.datasets.features import UNSTATED, EpisodeLayout, EpisodeMisfit, layout_of
@@ -118,6 +117,9 @@ def to_episode(recording: OfficialRecording, home: Path, codec: str) -> DatasetE
         raise EpisodeError("it is a recording of robospa, no official one")
     if not found.frames:
         raise EpisodeError("it has no pictures")
+    instructions = seen_sentences(recording.path)
+    if not instructions:
+        raise EpisodeError("no sentence is beside it: instructions/<episode>.json has no `seen`")
     configuration = recording.path.absolute().parents[1].name
     task, level = recording.variant
     key = TrialKey(task, level, recording.seed or 0, UNSTATED, configuration, SEEN)
@@ -128,7 +130,7 @@ def to_episode(recording: OfficialRecording, home: Path, codec: str) -> DatasetE
         key=key,
         kind=OFFICIAL,
         success=False,
-        instructions=_sentences(recording),
+        instructions=instructions,
         space=found.space,
         stride=0,
         commanded=commanded,
@@ -146,20 +148,6 @@ def to_episode(recording: OfficialRecording, home: Path, codec: str) -> DatasetE
         source=source(recording, home),
         source_sha256=file_hash(recording.path),
     )
-
-
-def _sentences(recording: OfficialRecording) -> tuple[str, ...]:
-    """The distinct training sentences beside a recording; those of `unseen` are left where they
-    are."""
-    path = recording.path.parent.parent / "instructions" / f"{recording.path.stem}.json"
-    try:
-        listed = json.loads(text_beside(path))["seen"]
-        texts = tuple(dict.fromkeys(text for text in listed if isinstance(text, str) and text))
-    except (OSError, ValueError, LookupError, TypeError, RecursionError):
-        texts = ()
-    if not texts:
-        raise EpisodeError("no sentence is beside it: instructions/<episode>.json has no `seen`")
-    return texts
 
 
 def _pictures(episode: Episode, codec: str) -> dict[str, Pictures]:

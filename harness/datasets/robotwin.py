@@ -10,6 +10,7 @@ red and blue exchanged, as official ones are, and are coded here: keep PNG until
 
 import json
 from collections.abc import Iterable, Iterator
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -61,12 +62,8 @@ def configuration(key: TrialKey) -> Path:
 
 
 def _converted(name: str, episode: DatasetEpisode) -> Episode:
-    key = episode.key
-    about: dict[str, str | int] = {
-        "task": key.task, "level": key.level, "seed": key.seed, "embodiment": key.embodiment,
-        "mode": key.mode, "split": key.split, "stride": episode.stride, "kind": episode.kind,
-        "scene_digest": episode.scene_digest, "replay_digest": episode.replay_digest,
-    }  # fmt: skip
+    names = ("stride", "kind", "scene_digest", "replay_digest")
+    about = {**asdict(episode.key), **{name: getattr(episode, name) for name in names}}
     return Episode(
         name,
         episode.commanded.astype(float),

@@ -77,13 +77,13 @@ def verify(
         f"{len(lines):,} episodes with {made.frames:,} frames: as many, in the same order and with "
         f"the same columns, in {MANIFEST}, the lists of episodes and the data."
     )
-    if made.about.get("suite") == RECORDINGS:
-        text = "Official recordings: their scenes are not known here, so none was replayed."
+    suite = made.about.get("suite")
+    if suite == RECORDINGS or not replays:
+        text = "No episode was replayed."
+        if suite == RECORDINGS:
+            text = "Official recordings: their scenes are not known here, so none was replayed."
         return Verification((), (*checked, text))
-    if not replays:
-        return Verification((), (*checked, "No episode was replayed."))
-    if made.about.get("suite") != SUITE:
-        suite = made.about.get("suite")
+    if suite != SUITE:
         problem = f"its scenes are of the suite {suite}, and those of this version of {SUITE}"
         return Verification((f"no episode can be replayed: {problem}",), tuple(checked))
     sample = _sample(folder, len(lines), replays, made.sums)

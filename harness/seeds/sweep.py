@@ -155,10 +155,7 @@ def sweep_with_bar(wanted: Sequence[Search], workers: int, evidence: Evidence) -
             left = duration_text((total - bar.done) / rate)
             bar.show(f"{search.key}: {rate:.2f} trials/s, {left} left")
 
-        def submit(key: ListKey, seed: int) -> Future[Attempt]:
-            return pool.submit((key, seed))
-
-        for search in sweep(submit, workers, wanted, note):
+        for search in sweep(lambda *job: pool.submit(job), workers, wanted, note):
             bar.done += search.count - _got(search)  # of one that was given up
             yield search
 

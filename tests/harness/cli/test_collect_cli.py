@@ -19,7 +19,7 @@ def test_what_was_made_as_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         say("6 episodes of 2 variants")
         return None if given["resume"] else CollectionResult((out,), 5, lines)
 
-    monkeypatch.setattr(collect, "collect_order", made)
+    monkeypatch.setattr(collect, "make", made)
     done = robospa("collect", "--tasks", "Pick_Blocks_Size", "--out", out, "--json")
     wanted = {"out": str(out), "finished_before": False, "folders": [str(out)], "episodes": 5}
     assert done.code == 1 and json.loads(done.out) == {**wanted, "missing": list(lines)}
