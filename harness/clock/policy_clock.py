@@ -269,12 +269,6 @@ def declared_latency(text: str) -> Latency | None:
     return parse_latency(latency)
 
 
-def frozen(text: str) -> str:
-    """The clock `text` without a file: the percentiles that it holds now."""
-    latency = declared_latency(text)
-    return PAUSED if latency is None else f"{REAL}:{latency}"
-
-
 def action_steps(rate: float) -> int:
     """Physics steps of an action at `rate` actions a second; raises ClockError for a rate whose
     actions take no whole number of them."""
@@ -374,4 +368,5 @@ def real_clock(timing: Timing, control: str) -> PolicyClock | None:
 
 def frozen_timing(timing: Timing) -> Timing:
     """`timing` without a file: with the percentiles that it holds now."""
-    return replace(timing, clock=frozen(timing.clock))
+    latency = declared_latency(timing.clock)
+    return timing if latency is None else replace(timing, clock=f"{REAL}:{latency}")

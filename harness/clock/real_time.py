@@ -291,12 +291,8 @@ class MotionLog:
         return np.asarray(np.abs(third).max(axis=1) / self.period**WINDOW)
 
     def entry(self) -> dict[str, object]:
-        """What goes into the record's diagnostics."""
-        return {ENTRY: self.summary()}
-
-    def summary(self) -> dict[str, object]:
-        """All of it: counts of periods, mean jerks [rad/s^3] over seams and
-        elsewhere, declared latencies [ms]."""
+        """What goes into the record's diagnostics: counts of periods, mean jerks [rad/s^3] over
+        seams and elsewhere, declared latencies [ms]."""
         seams, jerks = self.seams(), self.jerks()
         over = np.zeros(len(jerks), bool)
         for row in seams:
@@ -316,4 +312,4 @@ class MotionLog:
             found["mean_latency_ms"] = round(float(np.mean(self.latencies)), 3)
             found["max_latency_ms"] = round(max(self.latencies), 3)
         found["asked"], found["arrived"] = self.asked, self.arrived
-        return found
+        return {ENTRY: found}

@@ -22,8 +22,9 @@ from functools import partial
 from itertools import starmap
 from pathlib import Path
 
+from robospa.extras import need
 from robospa.harness.datasets.manifest import MANIFEST, DatasetManifest, SeedFailure, read_record
-from robospa.harness.datasets.pack import check_packages, image_codec, pack
+from robospa.harness.datasets.pack import FORMATS, image_codec, pack
 from robospa.harness.datasets.settings import (
     KEYFRAMES,
     Collection,
@@ -293,7 +294,8 @@ def make(
     `open_pool` and workers raise.
     """
     keys, _ = lists_of(order.settings), order.images
-    check_packages(order.layout)
+    for module in (FORMATS[order.layout].package, "PIL", "matplotlib"):  # those of card and format
+        need(module, "demos")
     with run_lock(order.out) as lock:
         store = EpisodeStore(order.out / EPISODES)
         robots = dict.fromkeys(key.embodiment for key in keys)  # a data set has one: one width

@@ -16,7 +16,6 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.extras import need
 from robospa.harness.datasets import lerobot, robotwin
 from robospa.harness.datasets.card import CardFacts, write_card
 from robospa.harness.datasets.episode import DatasetEpisode, read_episode_file
@@ -104,13 +103,6 @@ def image_codec(layout: str, wanted: str) -> str:
     if wanted != AUTO and wanted not in known:
         raise SettingsError(f"{layout} holds no {wanted} but {', '.join(known)}")
     return known[0] if wanted == AUTO else wanted
-
-
-def check_packages(layout: str) -> None:
-    """Raises MissingPackage if one that writes a format of `FORMATS`, or its card, is not
-    installed."""
-    for module in (FORMATS[layout].package, "PIL", "matplotlib"):
-        need(module, "demos")
 
 
 def pack(

@@ -332,8 +332,5 @@ def _cameras(folder: Path) -> tuple[str, ...]:
 def film_now(run: Run) -> list[str]:
     """Make the films that `run` lacks, at full speed; sentences about them. Raises RunError, and
     FilmsInterrupted on Ctrl-C."""
-    films = films_afterwards(run)
-    if not films.pending:
-        films.close()
-        return ["no film is missing"]
-    return finish_films(films, Progress(len(run.keys), len(run.keys)))
+    progress = Progress(len(run.keys), len(run.keys))
+    return finish_films(films_afterwards(run), progress) or ["no film is missing"]

@@ -174,14 +174,10 @@ def check_folder(folder: Path, resume: bool) -> None:
         raise RunError(f"there is no run in {folder} to resume; leave --resume out to start one")
     if folder.exists() and not folder.is_dir():
         raise RunError(f"{folder} is a file; choose another --out")
-    if not there and folder.exists() and not _is_empty(folder):
+    # What a driver killed at its start leaves behind does not count.
+    names = {path.name for path in folder.iterdir()} - {LOCK} if folder.exists() else ()
+    if not there and not all(fnmatch(name, PARTIAL) for name in names):
         raise RunError(f"{folder} is neither empty nor a run; choose another --out")
-
-
-def _is_empty(folder: Path) -> bool:
-    """Whether nothing lies in `folder` but what a driver killed at its start leaves behind."""
-    names = {path.name for path in folder.iterdir()} - {LOCK}
-    return all(fnmatch(name, PARTIAL) for name in names)
 
 
 def _allowed_changes(old: Part, new: Part, tasks: Collection[str] | None) -> Part:

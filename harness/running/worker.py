@@ -188,8 +188,10 @@ class Worker:
             policy.end({"end": record.end, "success": record.success})
         except Exception:  # the record is safe; the next trial starts on a new connection
             self._stale = True
-        if policy.failed:
-            self._drop_policy()
+        if policy.failed and is_url(target):
+            self._stale = True
+        elif policy.failed:
+            self._close_policy()
         return record
 
     @property
@@ -227,13 +229,6 @@ class Worker:
         if policy is not None:
             with contextlib.suppress(Exception):
                 policy.close()
-
-    def _drop_policy(self) -> None:
-        """After an error of its own a policy begins anew: a server's on a new connection."""
-        if self._policy is not None and is_url(self._policy.target):
-            self._stale = True
-        else:
-            self._close_policy()
 
     def recover(self) -> None:
         """After a loss: nothing of the world survives, and the connection is not trusted."""

@@ -25,8 +25,9 @@ from robospa.harness.clock.policy_clock import (
     Latency,
     PolicyClock,
     Switching,
+    Timing,
     declared_latency,
-    frozen,
+    frozen_timing,
     latency_json,
     of_samples,
     parse_latency,
@@ -112,11 +113,11 @@ def test_a_file_of_samples_becomes_their_percentiles(tmp_path: Path) -> None:
 def test_a_clock_is_frozen_with_what_its_file_holds(tmp_path: Path) -> None:
     file = tmp_path / "server.json"
     file.write_text(json.dumps(latency_json(of_samples([80.0, 120.0, 400.0]))))
-    clock = frozen(f"real:{file}")
+    timing = frozen_timing(Timing(clock=f"real:{file}"))
     file.write_text("{}")
-    assert clock == "real:p0=80ms,p50=120ms,p100=400ms"
-    assert frozen(clock) == clock
-    assert frozen("paused") == "paused"
+    assert timing.clock == "real:p0=80ms,p50=120ms,p100=400ms"
+    assert frozen_timing(timing) == timing
+    assert frozen_timing(Timing()) == Timing()
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"latency_ms": "soon"}', '{"latency_ms": [null]}'])
