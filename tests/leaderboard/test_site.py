@@ -197,14 +197,9 @@ def test_what_was_handed_in_has_to_fit_the_bundle(tmp_path: Path) -> None:
     folder = home / "mine"
     folder.mkdir(parents=True)
     (folder / "model.toml").write_text(CARD_TEXT)
-    for text, refusal in (
-        ("https://example.org/b.zip 5 abc", "64 hexadecimal digits"),
-        (f"https://example.org/b.zip 5 {64 * '0'}", "another bundle"),
-        ("javascript:alert(1) 5 abc", "not three lines"),
-    ):
-        (folder / "bundle.txt").write_text(text.replace(" ", "\n"))
-        with pytest.raises(BundleError, match=refusal):
-            add(valid, [], home, "mine")
+    (folder / "bundle.txt").write_text(f"https://example.org/b.zip\n5\n{64 * '0'}")
+    with pytest.raises(BundleError, match="another bundle"):
+        add(valid, [], home, "mine")
     (folder / "model.toml").write_text(CARD_TEXT.replace("Nobody", "Else"))
     with pytest.raises(BundleError, match="not the bundle's model card"):
         add(valid, [], home, "mine")

@@ -86,13 +86,6 @@ def test_a_port_that_is_no_policy_server(serve: Any, words: str) -> None:
         connect(url, timeouts=replace(QUICK, connect=0.5))
 
 
-def test_nobody_listens() -> None:
-    with port_that(lambda peer: None) as url:
-        socket.create_connection(("127.0.0.1", int(url.rsplit(":", 1)[1]))).close()
-    with pytest.raises(ConnectFailed, match="nothing listens"):
-        connect(url, timeouts=QUICK)
-
-
 @pytest.mark.parametrize("serve", [None, hang_up, UNAVAILABLE])
 def test_waits_for_a_server_that_starts_or_restarts(start: Any, serve: Any) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:

@@ -54,14 +54,12 @@ def curve(tmp_path: Path) -> LatencyCurve:
         ([0.8, 0.4, 0.2], 100.0),
         ([0.8, 0.7, 0.6], math.inf),
         ([0.8, 0.9, 0.0], 100.0 + 100.0 * 5 / 9),
+        ([0.0, 0.0, 0.0], math.nan),  # nothing can be lost of nothing
     ],
 )
 def test_half_is_where_the_line_first_falls_to_it(rates: list[float], expected: float) -> None:
-    assert crossing(np.array([0.0, 100.0, 200.0]), np.array(rates)) == pytest.approx(expected)
-
-
-def test_nothing_can_be_lost_of_nothing() -> None:
-    assert math.isnan(crossing(np.array([0.0, 100.0]), np.array([0.0, 0.0])))
+    found = crossing(np.array([0.0, 100.0, 200.0]), np.array(rates))
+    assert found == pytest.approx(expected, nan_ok=True)
 
 
 def test_points_are_held_against_the_lowest_latency_pair_by_pair(curve: LatencyCurve) -> None:
