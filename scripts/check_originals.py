@@ -26,13 +26,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from original_servers import QUICK
 from originals import world
 
 from robospa.clients import connect
 from robospa.protocol.policy import TrialInfo
+from robospa.protocol.transport import Timeouts
 
 HERE = Path(__file__).resolve().parent / "originals"
+QUICK = Timeouts(wait=20, connect=20, hello=20, reset=20, first_infer=20, infer=20, end=20)
 TRIAL = TrialInfo(world.TASK, "aloha-agilex", world.TEXT, world.SEED)
 Actions = NDArray[np.float64]
 Seen = Mapping[str, Any]

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from world import ROWS, Robot, flat, free_port, joints, main, namespace, observation, report
+from world import ROWS, Robot, announced_port, flat, joints, main, namespace, observation, report
 
 PATH = "/v1/realtime/robot/openpi"
 
@@ -33,12 +33,6 @@ def module(checkout: str, name: str) -> Any:
     return importlib.import_module(name)
 
 
-def port_of() -> int:
-    port = free_port()
-    report({"port": port})
-    return port
-
-
 def serve_starvla(checkout: str) -> None:
     server = module(checkout, "deployment.model_server.tools.websocket_policy_server")
 
@@ -50,7 +44,9 @@ def serve_starvla(checkout: str) -> None:
     said |= {"action_chunk_size": ROWS, "available_unnorm_keys": keys}
     said |= {"default_unnorm_key": keys[0], "training_obs_image_size": [224, 224]}
     policy = SimpleNamespace(predict_action=predict_action)
-    server.WebsocketPolicyServer(policy, "127.0.0.1", port_of(), metadata=said).serve_forever()
+    server.WebsocketPolicyServer(
+        policy, "127.0.0.1", announced_port(), metadata=said
+    ).serve_forever()
 
 
 def serve_lingbot(checkout: str) -> None:
@@ -60,7 +56,7 @@ def serve_lingbot(checkout: str) -> None:
         return {"action": None if seen.get("reset") else told(seen)}
 
     policy = SimpleNamespace(infer=infer)
-    server.WebsocketPolicyServer(policy, "127.0.0.1", port_of()).serve_forever()
+    server.WebsocketPolicyServer(policy, "127.0.0.1", announced_port()).serve_forever()
 
 
 def serve_vllm(checkout: str) -> None:
@@ -101,7 +97,7 @@ def serve_vllm(checkout: str) -> None:
 
     robot.__annotations__["websocket"] = WebSocket
     app.websocket(PATH)(robot)
-    web = uvicorn.Config(app, "127.0.0.1", port_of(), log_level="error")
+    web = uvicorn.Config(app, "127.0.0.1", announced_port(), log_level="error")
     asyncio.run(uvicorn.Server(web).serve())
 
 

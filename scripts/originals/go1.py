@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-import importlib.util
 from types import SimpleNamespace
 from typing import Any
 
-from world import Robot, flat, free_port, joints, main, report, stub
-
-
-def load(path: str) -> Any:
-    spec = importlib.util.spec_from_file_location("original", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+from world import Robot, announced_port, flat, joints, load, main, report, stub
 
 
 def serve(checkout: str) -> None:
@@ -27,9 +19,7 @@ def serve(checkout: str) -> None:
         return joints()
 
     server.model = SimpleNamespace(inference=inference)
-    port = free_port()
-    report({"port": port})
-    server.run("127.0.0.1", port)
+    server.run("127.0.0.1", announced_port())
 
 
 def ask(checkout: str, port: int) -> Any:

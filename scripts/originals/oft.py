@@ -7,8 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from go1 import load
-from world import TEXT, Robot, flat, free_port, joints, main, report, stub
+from world import TEXT, Robot, announced_port, flat, joints, load, main, report, stub
 
 LIMITS = SimpleNamespace(num_images_in_input=3, center_crop=False)
 
@@ -42,9 +41,7 @@ def serve(checkout: str) -> None:
     server = module.OpenVLAServer.__new__(module.OpenVLAServer)
     server.__dict__.update(dict.fromkeys(("vla", "processor", "action_head", "proprio_projector")))
     server.cfg = SimpleNamespace(use_film=False)
-    port = free_port()
-    report({"port": port})
-    server.run("127.0.0.1", port)
+    server.run("127.0.0.1", announced_port())
 
 
 def ask(checkout: str, port: int) -> Any:

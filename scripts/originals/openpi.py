@@ -2,33 +2,26 @@
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from world import Robot, flat, free_port, joints, main, namespace, observation, report
+from world import Robot, announced_port, flat, joints, load, main, namespace, observation, report
 
 NAMES = {"head": "cam_high", "left_wrist": "cam_left_wrist", "right_wrist": "cam_right_wrist"}
 
 
 def serve(checkout: str) -> None:
-    path = f"{checkout}/src/openpi/serving/websocket_policy_server.py"
-    spec = importlib.util.spec_from_file_location("server", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = load(f"{checkout}/src/openpi/serving/websocket_policy_server.py")
 
     def infer(seen: Any) -> Any:
         report(flat(seen))
         return {"actions": joints(), "state": np.zeros(14), "policy_timing": {"infer_ms": 1.0}}
 
-    port = free_port()
-    report({"port": port})
     metadata = {"reset_pose": [0, -1.5], "names": np.array(["a", "b"]), "big": np.ones(2, ">f4")}
-    module.WebsocketPolicyServer(
-        SimpleNamespace(infer=infer), "127.0.0.1", port, metadata
-    ).serve_forever()
+    policy, port = SimpleNamespace(infer=infer), announced_port()
+    module.WebsocketPolicyServer(policy, "127.0.0.1", port, metadata).serve_forever()
 
 
 def ask(checkout: str, port: int) -> Any:
@@ -46,9 +39,7 @@ def ask(checkout: str, port: int) -> Any:
     namespace("examples.aloha_real.real_env", make_real_env=lambda **_: real)
     namespace("examples.aloha_real", real_env=sys.modules["examples.aloha_real.real_env"])
     namespace("examples")
-    spec = importlib.util.spec_from_file_location("env", f"{checkout}/examples/aloha_real/env.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = load(f"{checkout}/examples/aloha_real/env.py")
     env = module.AlohaRealEnvironment(render_height=240, render_width=320)
     env.reset()
     policy = ActionChunkBroker(WebsocketClientPolicy("127.0.0.1", port), 6)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import sys
 from typing import Any
 
 import numpy as np
-from world import Robot, flat, free_port, joints, main, namespace, report, stub
+from world import Robot, announced_port, flat, joints, load, main, namespace, report, stub
 
 
 def serve(checkout: str) -> None:
@@ -17,11 +16,7 @@ def serve(checkout: str) -> None:
     sys.path.insert(0, f"{checkout}/script")
     stub("torch", "hydra", "dill", "diffusion_policy.common.pytorch_util")
     stub("diffusion_policy.policy.base_image_policy")
-    runner = importlib.util.spec_from_file_location(
-        "runner", f"{checkout}/policy/DP/diffusion_policy/env_runner/dp_runner.py"
-    )
-    module = importlib.util.module_from_spec(runner)
-    runner.loader.exec_module(module)
+    module = load(f"{checkout}/policy/DP/diffusion_policy/env_runner/dp_runner.py")
     module.torch.Tensor = type("Tensor", (), {})
     server = importlib.import_module("policy_model_server")
 
@@ -42,9 +37,7 @@ def serve(checkout: str) -> None:
             report(flat(window))
             return joints()
 
-    port = free_port()
-    report({"port": port})
-    server.ModelServer(Model(), host="127.0.0.1", port=port).start()
+    server.ModelServer(Model(), host="127.0.0.1", port=announced_port()).start()
 
 
 def ask(checkout: str, port: int) -> Any:
@@ -52,11 +45,7 @@ def ask(checkout: str, port: int) -> Any:
     stub("envs.utils.create_actor", "generate_episode_instructions")
     sys.path.insert(0, f"{checkout}/script")
     client = importlib.import_module("eval_policy_client")
-    spec = importlib.util.spec_from_file_location(
-        "half", f"{checkout}/policy/DP/deploy_policy_double_env.py"
-    )
-    half = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(half)
+    half = load(f"{checkout}/policy/DP/deploy_policy_double_env.py")
     robot, model = Robot(limit=18), client.ModelClient(host="127.0.0.1", port=port)
     model.call(func_name="reset_model")
     while not robot.done:

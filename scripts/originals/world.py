@@ -8,6 +8,7 @@ line a query; `ask` lets the original client act in `Robot` and reports the acti
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import itertools
 import json
 import os
@@ -130,6 +131,21 @@ def report(value: Any) -> None:
     print(json.dumps(value), file=OUT, flush=True)
     if next(queries) == FAILS > 0:
         raise RuntimeError("CUDA out of memory on rank 0")
+
+
+def load(path: str) -> Any:
+    """The module in a file, which is in no package."""
+    spec = importlib.util.spec_from_file_location("original", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def announced_port() -> int:
+    """A port that is free, after a report of it."""
+    port = free_port()
+    report({"port": port})
+    return port
 
 
 def free_port() -> int:

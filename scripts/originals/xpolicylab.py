@@ -16,8 +16,8 @@ from world import (
     TASK,
     TEXT,
     Robot,
+    announced_port,
     flat,
-    free_port,
     main,
     namespace,
     observation,
@@ -49,9 +49,7 @@ def serve(checkout: str) -> None:
             rows[4]["action_type"] = TYPE
             return rows
 
-    port = free_port()
-    report({"port": port})
-    config = server.PolicyServerConfig(host="127.0.0.1", port=port)
+    config = server.PolicyServerConfig(host="127.0.0.1", port=announced_port())
     asyncio.run(server.PolicyServer(Model(), config).serve_forever())
 
 

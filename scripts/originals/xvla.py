@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import os
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from world import Robot, flat, free_port, main, namespace, report, stub
+from world import Robot, announced_port, flat, load, main, namespace, report, stub
 
 
 class Tensor:
@@ -81,9 +80,7 @@ def serve(checkout: str) -> None:
         shown.update({f"image{n}": np.asarray(image) for n, image in enumerate(images)}, text=text)
         return {name: Tensor(np.zeros(1)) for name in ("input_ids", "image_input", "image_mask")}
 
-    port = free_port()
-    report({"port": port})
-    Model().run(process, "127.0.0.1", port)
+    Model().run(process, "127.0.0.1", announced_port())
 
 
 class Grippers(Robot):
@@ -101,10 +98,7 @@ def ask(checkout: str, port: int) -> Any:
     namespace("torch", Tensor=Tensor, set_default_dtype=lambda kind: None, float32=0)
     stub("imageio", "matplotlib.pyplot")
     os.chdir = lambda path: None  # type: ignore[assignment]
-    path = f"{checkout}/evaluation/robotwin-2.0/client.py"
-    spec = importlib.util.spec_from_file_location("client", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = load(f"{checkout}/evaluation/robotwin-2.0/client.py")
     robot, model = Grippers(limit=60), module.ClientModel("127.0.0.1", port)
     model.set_instruction(robot.get_instruction())
     module._rollout(robot, model)
