@@ -10,7 +10,6 @@ disk; then the expert's trials of some variants are run with both kinds of objec
 from __future__ import annotations
 
 import os
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -20,6 +19,7 @@ from typing import Any
 
 import numpy as np
 from frame import Figure, Result, main
+from made_archive import make_archive
 
 from robospa.harness.factory import policy_factory
 from robospa.harness.official.layout import OfficialLayout, official_world_parts
@@ -34,15 +34,6 @@ from robospa.tasks.official import needs
 from robospa.trial import TrialKey
 
 SEED = 100_000
-
-
-def made_up(folder: Path) -> Path:
-    """An archive of stand-ins."""
-    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "helpers"))
-    from made_archive import make_archive
-
-    found: Path = make_archive(folder)
-    return found
 
 
 def load_all(world: OfficialWorld, layout: OfficialLayout) -> tuple[list[float], int]:
@@ -79,7 +70,7 @@ def measure(assets: str = "", trials: int = 20) -> Result:
     """Both kinds of objects; `trials` about so many of the expert."""
     with tempfile.TemporaryDirectory() as folder:
         os.environ.setdefault("ROBOSPA_CACHE", folder)
-        os.environ[VARIABLE] = assets or str(made_up(Path(folder) / "assets"))
+        os.environ[VARIABLE] = assets or str(make_archive(Path(folder) / "assets"))
         official, builtin = OfficialLayout(True, "all"), OfficialLayout(False, "all")
         world = OfficialWorld()
         load_all(world, official)  # fills the cache
