@@ -1,6 +1,6 @@
 """Recorded demonstrations: do replays meet the goal, and what does one cost?
 
-    python benchmarks/demonstrations.py demonstrations [--trials 1] [--tasks NAME,..] [--json]
+    python benchmarks/demonstrations.py demonstrations [--trials 1] [--names TASK,..] [--json]
     python benchmarks/demonstrations.py collecting [--json]
 
 `demonstrations` records the expert on seeds of every variant that no list has, without pictures,

@@ -25,14 +25,16 @@ import platform
 import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field
 from datetime import date
+from functools import partial
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
-from multiprocessing import get_context
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+
+from robospa.harness.pool import JobProcess, Pool
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
@@ -183,7 +185,7 @@ def gather(
     """What `run(*job)` gives for each job, with the job, as objects with these attributes.
 
     Finished ones are kept in `path`, one JSON line each: stopped anywhere, the same command goes on
-    there. With several workers `run` and the jobs must be picklable.
+    there. Several workers find `run` in its script by its name.
     """
     lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
     known = {tuple(row["job"]): row for row in map(json.loads, lines)}
@@ -202,8 +204,14 @@ def _mapped(run: Callable[..., Json], jobs: Sequence[tuple[Any, ...]], workers: 
     if workers == 1:
         yield from (run(*job) for job in jobs)
         return
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        yield from pool.map(run, *zip(*jobs, strict=True)) if jobs else ()
+    place = (Path(inspect.getfile(run)).stem, run.__name__)
+    with Pool(partial(JobProcess, _spread, place, name="benchmark"), workers) as pool:
+        yield from (future.result() for future in [pool.submit(job) for job in jobs])
+
+
+def _spread(place: tuple[str, str]) -> Callable[[tuple[Any, ...]], Json]:
+    run = getattr(import_module(place[0]), place[1])
+    return lambda job: run(*job)
 
 
 # ---------------------------------------------------------------- the page

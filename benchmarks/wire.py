@@ -40,10 +40,9 @@ PEERS = Path(__file__).resolve().parents[1] / ".venv-peers"
 REQUIREMENTS: Mapping[str, tuple[str, ...]] = {
     "vla-eval": ("vla-eval",),
     "openpi-client": ("openpi-client", "typing_extensions"),  # imports it, does not ask for it
-    "xpolicylab": ("xpolicylab",),
     "xpolicylab's wire": ("msgpack-numpy", "msgpack", "websockets", "numpy"),
 }
-"""What pip is asked for. XPolicyLab's own code is not on PyPI; pip says so every time."""
+"""What pip is asked for. XPolicyLab's own code is not on PyPI."""
 SIDES = {
     "bare": "bare websockets",
     "robospa": "ours",

@@ -3,41 +3,34 @@
 A policy that knows the plan and sees what every pixel shows finds a pixel of each object that the
 plan names, and says the call. What it solves is what skills can reach at all.
 
-    python tools/skill_ceiling.py OUT.jsonl --seeds 3 [--workers 2] [--tasks A,B] [--table OUT.csv]
+    python benchmarks/skill_ceiling.py [--seeds 1] [--names TASK,...] [--json]
 
 Seeds are of a range that no list of accepted ones uses; those that the expert itself does not solve
-do not count. A trial that is in OUT
-already is not run again. Prints every variant that is not always solved.
+do not count. `--json` also writes a line a variant to benchmarks/results/skill_ceiling.csv.
 """
 
 from __future__ import annotations
 
-import argparse
-import csv
-import json
 import math
 from collections import defaultdict
-from collections.abc import Callable, Sequence
-from concurrent.futures import as_completed
 from dataclasses import replace
-from functools import partial
+from functools import cache
 from pathlib import Path
 from statistics import fmean
 
 import numpy as np
+from frame import RESULTS, Figure, Json, Result, gather, main
 from numpy.typing import NDArray
 
 from robospa.baselines.oracle import Oracle
 from robospa.geometry import Vec3
-from robospa.harness.pool import JobProcess, Pool
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import run_trial
 from robospa.harness.world import TABLE, SceneUnstable
 from robospa.observation import CameraSpec, Observation
 from robospa.protocol.policy import PolicySpec, TrialInfo
-from robospa.results.records.trial_record import TrialRecord
 from robospa.tasks import plan
-from robospa.tasks.catalog import build_scene, task, tasks
+from robospa.tasks.catalog import LEVELS, build_scene, task, tasks
 from robospa.tasks.objects import object_model
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import ObjectModel
@@ -217,95 +210,55 @@ class Shown:
         )
 
 
-def runner(_: None) -> Callable[[TrialKey], dict[str, object]]:
-    """`run` in a process of its own, which keeps its world."""
-    return partial(run, PlainWorld())
+@cache
+def plain_world() -> PlainWorld:
+    """One in a process."""
+    return PlainWorld()
 
 
-def run(world: PlainWorld, key: TrialKey) -> dict[str, object]:
-    """One trial as a row; a seed whose scene is not stable is told as such."""
+def in_calls(name: str, level: int, seed: int) -> Json:
+    """What came of one trial; a seed whose scene is not stable is told as such."""
+    world, key = plain_world(), TrialKey(name, level, seed)
     policy = PlanInCalls(world)
-    row: dict[str, object] = {"task": key.task, "level": key.level, "seed": key.seed}
     try:
-        record: TrialRecord = run_trial(world, policy, key, policy_seed=0)
+        record = run_trial(world, policy, key, policy_seed=0)
     except (SceneUnstable, ValueError) as error:
-        return {**row, "end": f"unstable: {error}"}
+        return {"end": f"unstable: {error}"}
     calls = record.diagnostics.get("calls", [])
-    wrong = [(one["skill"], one["feedback"]) for one in calls if one["feedback"] != "done"]
     end = record.end
     if end != "success" and not run_trial(world, Oracle(), key, policy_seed=0).success:
         end = "expert fails, too"  # so no list of accepted seeds would have it
     return {
-        **row,
         "end": end,
         "message": record.message,
         "steps": record.steps,
         "calls": len(calls),
         "seconds": round(record.wall_time, 1),
         "note": policy.note,
-        "failed": wrong,
+        "failed": [(one["skill"], one["feedback"]) for one in calls if one["feedback"] != "done"],
     }
 
 
-FIELDS = ("task", "level", "trials", "solved", "actions", "calls")
-
-
-def table(rows: Sequence[dict[str, object]]) -> list[dict[str, object]]:
-    """By variant: trials that count, solved ones, and the means of their actions and calls."""
-    found = defaultdict(list)
-    for row in rows:
-        if str(row["end"]).split()[0] not in ("unstable:", "expert"):
-            found[str(row["task"]), int(str(row["level"]))].append(row)
-    return [
-        {
-            **dict(zip(FIELDS, key, strict=False)),
-            "trials": len(some),
-            "solved": sum(row["end"] == "success" for row in some),
-            "actions": round(fmean(float(str(row["steps"])) for row in some), 1),
-            "calls": round(fmean(float(str(row["calls"])) for row in some), 1),
-        }
-        for key, some in sorted(found.items())
-    ]
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("out", type=Path)
-    parser.add_argument("--seeds", type=int, default=1)
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--tasks", default="")
-    parser.add_argument("--table", type=Path)
-    given = parser.parse_args()
-    text = given.out.read_text() if given.out.exists() else ""
-    rows = [json.loads(line) for line in text.splitlines()]
-    there = {(row["task"], row["level"], row["seed"]) for row in rows}
-    asked = [
-        TrialKey(one.name, level, FIRST_SEED + n)
-        for n in range(given.seeds)
-        for one in tasks().values()
-        for level in one.levels
-        if not given.tasks or one.name in given.tasks.split(",")
-    ]
-    left = [key for key in asked if (key.task, key.level, key.seed) not in there]
-    from skill_ceiling import runner  # by the name that its process finds it by
-
-    start = partial(JobProcess, runner, None, name="ceiling")
-    with Pool(start, given.workers) as pool, given.out.open("a") as out:
-        for job in as_completed([pool.submit(key) for key in left]):
-            rows.append(job.result())
-            print(json.dumps(rows[-1]), file=out, flush=True)
-    lines = table(rows)
-    if given.table:
-        with given.table.open("w", newline="") as out:
-            writer = csv.DictWriter(out, FIELDS, lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(lines)
-    trials, solved = (sum(int(str(line[name])) for line in lines) for name in ("trials", "solved"))
-    print(f"{solved} of {trials} trials of {len(lines)} variants solved; not always:")
-    for line in lines:
-        if line["solved"] != line["trials"]:
-            print(line)
+def measure(seeds: int = 1, workers: int = 2, names: str = "") -> Result:
+    """`seeds` of every variant of the tasks named with commas, "" for all."""
+    found = [task(name) for name in names.split(",")] if names else tasks().values()
+    jobs = [(one.name, n, FIRST_SEED + k) for k in range(seeds) for one in found for n in LEVELS]
+    variants = defaultdict(list)
+    for row in gather(Path("build/skill_ceiling.jsonl"), jobs, in_calls, workers):
+        if row.end.split()[0] not in ("unstable:", "expert"):
+            variants[row.job[:2]].append(row)
+    lines, missed, solved = ["task,level,trials,solved,actions,calls"], [], 0
+    for (name, level), some in sorted(variants.items()):
+        good = sum(row.end == "success" for row in some)
+        means = (round(fmean(getattr(row, what) for row in some), 1) for what in ("steps", "calls"))
+        lines.append(",".join(map(str, (name, level, len(some), good, *means))))
+        missed += [f"{name} {level}: {good} of {len(some)}"] if good < len(some) else []
+        solved += good
+    what, trials = "trials that the expert's plan solves in calls", sum(map(len, variants.values()))
+    figures = [Figure(what, solved, f"of {trials}", note="; ".join(missed))]
+    table = {RESULTS / "skill_ceiling.csv": "\n".join(lines) + "\n"}
+    return Result("What skills can reach", figures, files=table)
 
 
 if __name__ == "__main__":
-    main()
+    main(skill_ceiling=measure)
