@@ -26,6 +26,7 @@ from robospa.harness.datasets.maker import EpisodeMaker
 from robospa.harness.datasets.workers import EpisodeJob, attempt_job
 from robospa.harness.demonstrations.demonstration import DemonstrationWorld, replay, show
 from robospa.harness.demonstrations.recorder import FrameRecorder, frame_steps
+from robospa.harness.selection import parse_levels, parse_tasks
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.world import SceneUnstable
 from robospa.observation import DEFAULT_CAMERAS
@@ -72,21 +73,16 @@ def per_cent(found: Iterable[bool]) -> float:
     return round(100 * sum(values) / len(values), 2)
 
 
-def chosen(names: str) -> list[str]:
-    """Tasks named with commas, "" for all."""
-    return [task(n).name for n in names.split(",")] if names else list(tasks())
-
-
 # ---------------------------------------------------------------- replays of every variant
 
 
 def demonstrations(
-    trials: int = 1, first: int = 950_000, names: str = "", levels: str = "1,2,3,4,5",
+    trials: int = 1, first: int = 950_000, names: str = "all,basic", levels: str = "1-5",
     workers: int = 2,
 ) -> Result:  # fmt: skip
     """The expert's demonstrations, replayed."""
-    seeds, numbers = range(first, first + trials), levels.split(",")
-    jobs = [(name, int(n), seed) for seed in seeds for name in chosen(names) for n in numbers]
+    seeds, chosen = range(first, first + trials), parse_tasks(names)
+    jobs = [(name, n, seed) for seed in seeds for name in chosen for n in parse_levels(levels)]
     rows = gather(Path("build/demonstrations.jsonl"), jobs, made, workers)
     variants: dict[Variant, list[Found]] = {}
     for row in (row for row in rows if row.valid):

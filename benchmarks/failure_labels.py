@@ -17,10 +17,11 @@ from dataclasses import replace
 from frame import Figure, Result, main
 
 from robospa.baselines.oracle import FailingOracle
+from robospa.harness.selection import parse_tasks
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import TrialSetup, run_trial, task_parts
 from robospa.results.failures.labels import NAMES, label
-from robospa.tasks.catalog import tasks
+from robospa.tasks.catalog import task
 from robospa.trial import TrialKey
 
 FIRST_SEED = 920_000
@@ -67,14 +68,13 @@ def found_label(world: SapienWorld, kind: str, key: TrialKey) -> str | None:
     return failure.kind if failure else "none"
 
 
-def measure(seeds: int = 3, names: str = "") -> Result:
-    """All mistakes of the named tasks, "" for all."""
+def measure(seeds: int = 3, names: str = "spatial,procedural") -> Result:
+    """All mistakes of the tasks that `names` names."""
     world = SapienWorld(render=False)
     right, counted, idle = Counter[str](), Counter[str](), 0
     wrong = []
-    known = [name for name, task in tasks().items() if task.dimension in LEVELS]
-    for name in names.split(",") if names else known:
-        dimension = tasks()[name].dimension
+    for name in parse_tasks(names):
+        dimension = task(name).dimension
         for kind, expected in EXPECTED[dimension].items():
             for level in LEVELS[dimension]:
                 for seed in range(FIRST_SEED, FIRST_SEED + seeds):

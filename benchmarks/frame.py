@@ -35,6 +35,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from robospa.harness.pool import JobProcess, Pool
+from robospa.text import markdown_table
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
@@ -251,20 +252,21 @@ def page(results: Sequence[Json]) -> str:
 
 def section(result: Json) -> str:
     """One measurement: its text, its table, its command."""
-    lines = ["| what | measured | bar | note |", "|---|---|---|---|"]
+    rows = []
     for figure in figures(result):
         verdict = {True: "met", False: "**not met**", None: ""}[figure.met]
         source = f"`{figure.command}`" if figure.command else ""
         note = "; ".join(words for words in (figure.note, source) if words)
         cells = (figure.what, measured(figure), f"{figure.bar} {verdict}".strip(), note)
-        lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
+        rows.append([cell.replace("|", "\\|") for cell in cells])
     load = result["machine"].get("load")
     about = [f"`{result['command']}`, {result['date']}" + (f", load {load}" if load else "")]
     others = {k: v for k, v in result["versions"].items() if k not in ("python", *PACKAGES)}
     about += [", ".join(f"{name} {value}" for name, value in others.items())]
     about += [result["circumstances"]]
     head = f'<a id="{result["benchmark"]}"></a>\n\n## {result["title"]}'
-    parts = (head, result["text"].strip(), "\n".join(lines), "; ".join(w for w in about if w) + ".")
+    table = markdown_table(("what", "measured", "bar", "note"), rows)
+    parts = (head, result["text"].strip(), table, "; ".join(w for w in about if w) + ".")
     return "\n\n".join(part for part in parts if part)
 
 

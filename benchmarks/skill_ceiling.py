@@ -24,13 +24,14 @@ from numpy.typing import NDArray
 
 from robospa.baselines.oracle import Oracle
 from robospa.geometry import Vec3
+from robospa.harness.selection import parse_tasks
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import run_trial
 from robospa.harness.world import TABLE, SceneUnstable
 from robospa.observation import CameraSpec, Observation
 from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.tasks import plan
-from robospa.tasks.catalog import LEVELS, build_scene, task, tasks
+from robospa.tasks.catalog import LEVELS, build_scene, task
 from robospa.tasks.objects import object_model
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import ObjectModel
@@ -239,10 +240,10 @@ def in_calls(name: str, level: int, seed: int) -> Json:
     }
 
 
-def measure(seeds: int = 1, workers: int = 2, names: str = "") -> Result:
-    """`seeds` of every variant of the tasks named with commas, "" for all."""
-    found = [task(name) for name in names.split(",")] if names else tasks().values()
-    jobs = [(one.name, n, FIRST_SEED + k) for k in range(seeds) for one in found for n in LEVELS]
+def measure(seeds: int = 1, workers: int = 2, names: str = "all,basic") -> Result:
+    """`seeds` of every variant of the tasks that `names` names."""
+    tasks = parse_tasks(names)
+    jobs = [(name, n, FIRST_SEED + k) for k in range(seeds) for name in tasks for n in LEVELS]
     variants = defaultdict(list)
     for row in gather(Path("build/skill_ceiling.jsonl"), jobs, in_calls, workers):
         if row.end.split()[0] not in ("unstable:", "expert"):

@@ -26,6 +26,7 @@ from typing import Any
 from rich.progress import track
 
 from robospa.harness.pool import JobProcess, Pool
+from robospa.harness.selection import parse_levels, parse_tasks
 from robospa.tasks import catalog
 
 Job = tuple[str, int, int, str]
@@ -83,18 +84,12 @@ def off(counts: dict[str, int]) -> float:
     return max(abs(count - even) for count in counts.values()) / even
 
 
-def chosen(tasks: str, levels: str) -> list[tuple[str, int]]:
-    """The variants that the options name."""
-    names = [catalog.task(name).name for name in tasks.split(",") if name] or list(catalog.tasks())
-    return [(name, int(level)) for level in levels.split(",") for name in names]
-
-
 def main() -> int:
     """Look at what is not in the file yet and sum up."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scenes", type=int, default=10_000)
-    parser.add_argument("--tasks", default="")
-    parser.add_argument("--levels", default="1,2,3,4,5")
+    parser.add_argument("--tasks", default="all,basic")
+    parser.add_argument("--levels", default="1-5")
     parser.add_argument("--mode", default="clean")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("build/scenes.json"))
@@ -105,7 +100,8 @@ def main() -> int:
         for r in known
         if r["scenes"] >= arguments.scenes and r.get("mode", "clean") == arguments.mode
     }
-    wanted = chosen(arguments.tasks, arguments.levels)
+    names = parse_tasks(arguments.tasks)
+    wanted = [(name, level) for level in parse_levels(arguments.levels) for name in names]
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
     from check_scenes import looker  # by the name that its process finds it by
 

@@ -15,23 +15,22 @@ import csv
 import sys
 from collections import Counter, defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from robospa.results.paper.published import load
 from robospa.results.records.runs import read_run
+from robospa.text import markdown_table
 
 ROOT = Path(__file__).resolve().parents[1]
 COUNTS = ROOT / "benchmarks" / "results" / "expert_robots.csv"
 PAGE = ROOT / "docs" / "adding-a-robot.md"
 HEAD = "| robot |"
-FIELDS = ("robot", "task", "level", "solved", "tried", "failed")
 ENOUGH = 0.95
 """The share of its trials that the expert has to solve of a variant."""
 
 
-@dataclass(frozen=True)
-class Variant:
+class Variant(NamedTuple):
     """How many of the tried trials were solved, and the seeds of those that were not."""
 
     robot: str
@@ -52,10 +51,9 @@ def counted(runs: Sequence[Path]) -> list[Variant]:
         for record in read_run(run).records.values():
             key = record.key
             solved[key.embodiment, key.task, key.level][key.seed] = record.success
+    failed = {key: tuple(sorted(s for s in seeds if not seeds[s])) for key, seeds in solved.items()}
     return [
-        Variant(
-            *key, sum(seeds.values()), len(seeds), tuple(sorted(s for s in seeds if not seeds[s]))
-        )
+        Variant(*key, sum(seeds.values()), len(seeds), failed[key])
         for key, seeds in sorted(solved.items())
     ]
 
@@ -64,31 +62,23 @@ def write(path: Path, variants: Sequence[Variant]) -> None:
     """The counts as CSV, a line for each variant and robot."""
     with path.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(FIELDS)
-        for v in variants:
-            failed = " ".join(map(str, v.failed))
-            writer.writerow((v.robot, v.task, v.level, v.solved, v.tried, failed))
+        writer.writerow(Variant._fields)
+        writer.writerows((*v[:-1], " ".join(map(str, v.failed))) for v in variants)
 
 
 def read(path: Path) -> list[Variant]:
     """The counts of `write`."""
     with path.open(newline="") as file:
-        return [
-            Variant(
-                row["robot"],
-                row["task"],
-                int(row["level"]),
-                int(row["solved"]),
-                int(row["tried"]),
-                tuple(map(int, row["failed"].split())),
-            )
-            for row in csv.DictReader(file)
-        ]
+        _, *rows = csv.reader(file)
+    return [
+        Variant(robot, task, *map(int, counts), tuple(map(int, failed.split())))
+        for robot, task, *counts, failed in rows
+    ]
 
 
 def merged(old: Sequence[Variant], new: Sequence[Variant]) -> list[Variant]:
     """All variants, `new` ones in place of the `old` of the same robot, task and level."""
-    found = {(v.robot, v.task, v.level): v for v in (*old, *new)}
+    found = {v[:3]: v for v in (*old, *new)}
     return [found[key] for key in sorted(found)]
 
 
@@ -96,18 +86,17 @@ def table(variants: Sequence[Variant]) -> list[str]:
     """Lines of Markdown: a row for each robot, a column for each category."""
     category = {name: task.category for name, task in load().tasks.items()}
     columns = list(dict.fromkeys(category.values()))
-    lines = [f"{HEAD} {' | '.join(columns)} | all |", "|---" * (len(columns) + 2) + "|"]
+    rows = []
     for robot in dict.fromkeys(v.robot for v in variants):
         solved, tried = Counter[str](), Counter[str]()
         for v in (v for v in variants if v.robot == robot):
             for column in (category[v.task], "all"):
                 solved[column] += v.solved
                 tried[column] += v.tried
-        cells = [f"{solved[c]}/{tried[c]}" for c in columns]
         share = 1000 * solved["all"] // tried["all"] / 10  # never rounded up to all of them
         whole = f"{solved['all']:,}/{tried['all']:,}: {share:.1f} %"
-        lines.append(f"| {robot} | {' | '.join(cells)} | {whole} |")
-    return lines
+        rows.append((robot, *(f"{solved[c]}/{tried[c]}" for c in columns), whole))
+    return markdown_table(("robot", *columns, "all"), rows).splitlines()
 
 
 def below(variants: Sequence[Variant]) -> dict[tuple[str, str], dict[int, Variant]]:

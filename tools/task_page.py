@@ -17,6 +17,7 @@ from pathlib import Path
 from robospa.harness.world import RenderUnavailable, SceneUnstable
 from robospa.tasks.catalog import tasks
 from robospa.tasks.task import Task
+from robospa.text import markdown_table
 from robospa.trial import CATEGORY_NAMES
 
 PAGE = Path("docs/tasks.md")
@@ -114,8 +115,8 @@ def table(members: Sequence[Task], rates: Rates) -> list[str]:
         if any(set(cell) - set("0/-") for cell in cells):
             columns.append((policy, cells))
     heads = ["task", *(head for head, _ in columns)]
-    lines += [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
-    return lines + [row(task, [of[i] for _, of in columns]) for i, task in enumerate(members)]
+    rows = [row(task, [of[i] for _, of in columns]) for i, task in enumerate(members)]
+    return lines + markdown_table(heads, rows).splitlines()
 
 
 def shared(name: str, members: Sequence[Task], cells: Sequence[str]) -> str:
@@ -138,11 +139,11 @@ def per_task(task: Task) -> str:
     return f"{things}; limit {limit}" if task.dimension == "procedural" else f"n {n}"
 
 
-def row(task: Task, cells: Sequence[str]) -> str:
-    """The line of one task: its picture, what is to be done, and `cells`."""
+def row(task: Task, cells: Sequence[str]) -> list[str]:
+    """The cells of one task: its picture, what is to be done, and `cells`."""
     picture = f"{PICTURES.relative_to(PAGE.parent).as_posix()}/{picture_name(task)}"
     first = f"![{task.name}]({picture})<br>**{task.name}**<br>{task.summary}"
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in (first, *cells)) + " |"
+    return [cell.replace("|", "\\|") for cell in (first, *cells)]
 
 
 def picture_name(task: Task) -> str:
