@@ -19,7 +19,7 @@ from pathlib import Path
 
 from frame import Figure, Result, main
 
-COMMAND = [sys.executable, "-c", "from robospa.harness.cli.main import main; main()"]
+COMMAND = [sys.executable, "-m", "robospa"]
 
 
 def evaluate(url: str, folder: Path, trials: int, workers: int) -> subprocess.Popen[bytes]:

@@ -86,13 +86,6 @@ def capture(scene: sapien.Scene, cameras: Cameras) -> list[NDArray[np.uint8]]:
     return images
 
 
-def timed(run: Callable[[], object]) -> float:
-    """CPU time [ms] of one call."""
-    began = time.process_time()
-    run()
-    return (time.process_time() - began) * 1e3
-
-
 def medians(sides: dict[str, Callable[[], object]], rounds: int) -> dict[str, float]:
     """CPU time [ms] of each side after a call that warms it up, in turns."""
     for run in sides.values():
@@ -100,7 +93,9 @@ def medians(sides: dict[str, Callable[[], object]], rounds: int) -> dict[str, fl
     costs: dict[str, list[float]] = {name: [] for name in sides}
     for _ in range(rounds):
         for name, run in sides.items():
-            costs[name].append(timed(run))
+            began = time.process_time()
+            run()
+            costs[name].append((time.process_time() - began) * 1e3)
     return {name: statistics.median(found) for name, found in costs.items()}
 
 

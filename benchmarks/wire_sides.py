@@ -44,17 +44,11 @@ WORDS = " ".join(["word"] * 20)
 Call = Callable[[], object]
 
 
-def frames(path: str) -> NDArray[np.uint8]:
-    """Three pictures (3, 240, 320, 3) uint8."""
-    images: NDArray[np.uint8] = np.load(path)
-    return images
-
-
 def observation(path: str) -> dict[str, Any]:
     """The observation that we send: three frames, 14 joints, 16 numbers of poses, 20 words."""
     rng = np.random.default_rng(0)
     return {
-        "images": dict(zip(CAMERAS, frames(path), strict=True)),
+        "images": dict(zip(CAMERAS, np.load(path), strict=True)),
         "state": rng.random(14, dtype=np.float32),
         "ee": rng.random((2, 8), dtype=np.float32),
         "instruction": WORDS,

@@ -15,10 +15,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
 
 from robospa.geometry import Pose, look_rotation
 from robospa.harness.demonstrations.demonstration import demonstrate
@@ -26,15 +26,14 @@ from robospa.harness.pictures.gallery import first_frame
 from robospa.harness.pictures.video import FPS, FilmRecorder
 from robospa.harness.sim import furniture, renderer
 from robospa.harness.sim.bodies import to_sapien
+from robospa.harness.sim.motion import DEMONSTRATION_LIMITS
+from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.world import CameraView, World
 from robospa.observation import CameraSpec
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.sentences import instruction
 from robospa.tasks.shapes import Shape, Skin
 from robospa.trial import REFERENCE, TrialKey
-
-if TYPE_CHECKING:
-    from PIL import Image
 
 SEED = 100_000
 SHOWN = (
@@ -117,9 +116,6 @@ class Studio(renderer.Renderer):
 
 def studio() -> World:
     """A world that is drawn in the studio; only for this process's films of tasks."""
-    from robospa.harness.sim.motion import DEMONSTRATION_LIMITS
-    from robospa.harness.sim.sapien_world import SapienWorld
-
     furniture.SHADOW_SIZE, furniture.LAMP_SIZE, furniture.AMBIENT = 2048, 1024, 0.36
     furniture.FLOOR, furniture.LEGS = (0.03, 0.036, 0.046), (0.3, 0.3, 0.3)
     world = SapienWorld(render=True, limits=DEMONSTRATION_LIMITS)
@@ -143,8 +139,6 @@ class Animation(FilmRecorder):
 
     def add(self, image: NDArray[np.uint8]) -> None:
         """Take one RGB frame, uint8 (height, width, 3)."""
-        from PIL import Image
-
         if self._count % self._every == 0:
             self.frames.append(self._page(Image.fromarray(image)))
         self._count += 1
@@ -165,8 +159,6 @@ def encode(frames: list[Image.Image], most_bytes: int) -> bytes:
 
 def captioned(image: Image.Image, sentence: str) -> Image.Image:
     """`image` in the size that is shown, and `sentence` below it."""
-    from PIL import Image, ImageDraw, ImageFont
-
     made = Image.new("RGB", (SIZE[0], SIZE[1] + STRIP), DARK)
     made.paste(image.resize(SIZE, Image.Resampling.LANCZOS), (0, 0))
     draw, font = ImageDraw.Draw(made), ImageFont.load_default(TEXT)
@@ -199,8 +191,6 @@ def robot_frames(world: World, robot: str) -> list[Image.Image]:
 
 def tiled(cells: list[tuple[str, Image.Image]], across: int) -> Image.Image:
     """Labelled pictures on one sheet, `across` of them in a row."""
-    from PIL import Image, ImageDraw, ImageFont
-
     wide, high = SHEET[0] + APART, SHEET[1] + LABEL + APART
     made = Image.new("RGB", (across * wide, -(-len(cells) // across) * high), "white")
     draw, font = ImageDraw.Draw(made), ImageFont.load_default(SMALL)
@@ -213,8 +203,6 @@ def tiled(cells: list[tuple[str, Image.Image]], across: int) -> Image.Image:
 
 def randomized_sheet(world: World) -> Image.Image:
     """Twenty randomised scenes as the head camera sees them."""
-    from PIL import Image
-
     cells = []
     for task in RANDOMIZED.split(","):
         scene = build_scene(task, 4, SEED, mode="randomized")
@@ -225,9 +213,6 @@ def randomized_sheet(world: World) -> Image.Image:
 
 def main(folder: Path) -> None:
     """Write all films into `folder`."""
-    from robospa.harness.sim.motion import DEMONSTRATION_LIMITS
-    from robospa.harness.sim.sapien_world import SapienWorld
-
     world = SapienWorld(render=True, limits=DEMONSTRATION_LIMITS)
     films = {robot: robot_frames(world, robot) for robot in ROBOTS}
     for robot, frames in films.items():

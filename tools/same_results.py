@@ -20,13 +20,13 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-PARTS = ("scenes", "wire", "trials", "tables")
 SEEDS = (100000, 100001, 750000)
 TIMES = ("wall_time", "timing", "latency", "attempts")
 """Fields of a record that depend on the machine."""
@@ -76,14 +76,7 @@ class PoseWalk:
         return walk.astype(np.float32)
 
 
-def pose_walk() -> PoseWalk:
-    """A policy in end-effector poses."""
-    return PoseWalk("ee")
-
-
-def delta_walk() -> PoseWalk:
-    """A policy in changes of end-effector poses."""
-    return PoseWalk("delta_ee")
+pose_walk, delta_walk = partial(PoseWalk, "ee"), partial(PoseWalk, "delta_ee")
 
 
 def __getattr__(name: str) -> Callable[[], object]:
@@ -183,13 +176,9 @@ def write_tables(folder: Path, run: Path) -> None:
 
 
 def _robospa(*words: str, codes: tuple[int, ...] = (0,)) -> str:
-    here = str(Path(__file__).resolve().parent)
-    code = (
-        f"import sys; sys.path.append({here!r})\nfrom robospa.harness.cli.main import main\nmain()"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code, *words], capture_output=True, text=True, cwd=here
-    )
+    here = Path(__file__).resolve().parent  # from where it finds the policies of this file
+    command = [sys.executable, "-m", "robospa", *words]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=here)
     if done.returncode not in codes:
         sys.exit(f"robospa {' '.join(words)} ended with {done.returncode}:\n{done.stderr[-2000:]}")
     return done.stdout
@@ -230,7 +219,7 @@ def main() -> None:
     commands = parser.add_subparsers(dest="command", required=True)
     write = commands.add_parser("write")
     write.add_argument("folder", type=Path)
-    write.add_argument("--only", default=",".join(PARTS))
+    write.add_argument("--only", default="scenes,wire,trials,tables")
     write.add_argument("--run", type=Path, default=None)
     compare = commands.add_parser("compare")
     compare.add_argument("before", type=Path)
@@ -242,18 +231,18 @@ def main() -> None:
         sys.exit(1 if found else 0)
     folder = options.folder.resolve()
     folder.mkdir(parents=True, exist_ok=True)
+    run = (options.run or folder / "trials" / "oracle").resolve()
+    parts: dict[str, Callable[[Path], None]] = {
+        "scenes": write_scenes,
+        "wire": write_wire,
+        "trials": write_trials,
+        "tables": partial(write_tables, run=run),
+    }
     for part in options.only.split(","):
+        if part not in parts:
+            parser.error(f"unknown part {part!r}; known are {', '.join(parts)}")
         print(part, flush=True)
-        if part == "scenes":
-            write_scenes(folder)
-        elif part == "wire":
-            write_wire(folder)
-        elif part == "trials":
-            write_trials(folder)
-        elif part == "tables":
-            write_tables(folder, (options.run or folder / "trials" / "oracle").resolve())
-        else:
-            parser.error(f"unknown part {part!r}; known are {', '.join(PARTS)}")
+        parts[part](folder)
 
 
 if __name__ == "__main__":

@@ -83,14 +83,10 @@ def corners(items: Sequence[SceneObject]) -> np.ndarray:
     sizes = np.array([model.size for model in models]).reshape(-1, 3)
     local = SIGNS * sizes[:, None]
     local[:, :, 2] += np.array([model.bottom for model in models])[:, None]
-    turned = local @ turns(items).transpose(0, 2, 1)
+    rotations = [to_matrix(item.pose.rotation) for item in items]
+    turned = local @ np.array(rotations).reshape(-1, 3, 3).transpose(0, 2, 1)
     at = np.array([item.pose.position for item in items]).reshape(-1, 1, 3)
     return np.asarray(turned + at)
-
-
-def turns(items: Sequence[SceneObject]) -> np.ndarray:
-    """(N, 3, 3) rotations of the objects."""
-    return np.array([to_matrix(item.pose.rotation) for item in items]).reshape(-1, 3, 3)
 
 
 def near(items: Sequence[SceneObject]) -> Iterator[tuple[int, int, float]]:
@@ -383,15 +379,11 @@ def cluttered(scene: Scene) -> Iterator[str]:
     yield from _hidden(scene)
 
 
-WAYS = np.stack([np.cos(np.arange(32) * math.pi / 32), np.sin(np.arange(32) * math.pi / 32)])
-"""(2, 32) directions in the plane, in which things are looked at from the side."""
-
-
 def _meet(round_one: SceneObject, other: SceneObject) -> bool:
     """Whether an upright cylinder around one meets the other's box, both seen from above."""
     radius = object_model(round_one.asset, round_one.params).radius
-    middle = np.array(round_one.pose.position[:2]) @ WAYS
-    box = corners((other,))[0, :, :2] @ WAYS
+    middle = np.array(round_one.pose.position[:2]) @ AROUND.T
+    box = corners((other,))[0, :, :2] @ AROUND.T
     apart = np.maximum(middle - radius - box.max(axis=0), box.min(axis=0) - middle - radius)
     return bool((apart < 0).all())
 

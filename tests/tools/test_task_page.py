@@ -14,6 +14,7 @@ import task_page
 from expert_table import COUNTS, PAGE, Variant, below, counted, merged, read, table, write
 from fake_runs import make_run, record, shown
 from freeze_seeds import shipped
+from PIL import Image
 from task_rates import task_rates
 
 from robospa.harness.robots import embodiments
@@ -100,9 +101,6 @@ def test_the_lists_of_a_suite() -> None:
 
 
 # --------- animated pictures of the documentation: what is shown, how long, and how large files get
-
-
-Image = pytest.importorskip("PIL.Image")
 
 
 def test_some_frames_are_kept_with_the_sentence_below() -> None:
