@@ -167,7 +167,7 @@ class Scene:
                 "objects": _objects(data["objects"]),
                 "table_shift": (shift[0], shift[1]),
                 "clutter": _objects(data.get("clutter", ())),
-                "surroundings": convert(data.get("surroundings", {}), Surroundings),
+                "surroundings": convert(data.get("surroundings", PLAIN), Surroundings),
                 "wrist_shifts": tuple(map(tuple, data.get("wrist_shifts", Scene.wrist_shifts))),
             }
         )
@@ -193,10 +193,12 @@ def _objects(rows: Iterable[Mapping[str, Any]]) -> tuple[SceneObject, ...]:
     )
 
 
+PLAIN = _json_values(Surroundings())
+"""In full: what is left out, `convert` leaves to the class, and `_json_values` out again."""
 OPTIONAL: Mapping[str, object] = {
     "table_rise": 0.0,
     "clutter": [],
-    "surroundings": _json_values(Surroundings()),
+    "surroundings": PLAIN,
     "strengths": {},
     "wrist_shifts": [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]],
 }
