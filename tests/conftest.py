@@ -7,7 +7,7 @@ import re
 import shutil
 import socketserver
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -150,3 +150,11 @@ def world_asked_here(monkeypatch: pytest.MonkeyPatch) -> None:
         "probe_world",
         lambda config, render: dict(open_world(config.world, config.world_arguments).info()),
     )
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    from devtools import chromium
+
+    with chromium(tmp_path_factory.mktemp("profile")) as page:
+        yield page

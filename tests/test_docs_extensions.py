@@ -19,9 +19,7 @@ from wire_helpers import serving
 
 from robospa.clients import check_options, connect
 from robospa.clients.dialect import dialects
-from robospa.geometry import Pose, axis_rotation, look_rotation, rotate
 from robospa.harness import robots
-from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.protocol.conformance import check
 from robospa.protocol.errors import HandshakeError
@@ -127,20 +125,6 @@ def test_the_commands_of_its_page_work(package: Path) -> None:
 
 
 # --- a robot ----------------------------------------------------------------------------------
-
-
-def grasps(robot: Embodiment, arm: int, count: int) -> list[Pose]:
-    """End-effector poses of grasps on the arm's side of the table, tilted."""
-    rng, hand, out = np.random.default_rng(arm), robot.arms[arm].gripper, []
-    for _ in range(count):
-        x, y = (2 * arm - 1) * rng.uniform(0.0, 0.28), rng.uniform(-0.2, 0.15)
-        turn, tilt = rng.uniform(-0.6, 0.6), rng.uniform(0.2, 0.6)
-        closing = (np.cos(turn), np.sin(turn), 0.0)
-        approach = rotate(axis_rotation(closing, tilt), (0.0, 0.0, -1.0))
-        point = np.array((x, y, TABLE_TOP + 0.02))
-        at = (point - hand.grasp_centre * np.array(approach)).tolist()
-        out.append(Pose((at[0], at[1], at[2]), look_rotation(approach, closing)))
-    return out
 
 
 def test_it_meets_the_scenes_of_every_robot_and_its_joints_make_columns(package: Path) -> None:

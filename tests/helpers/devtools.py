@@ -29,11 +29,6 @@ FLAGS = (
 PATIENCE = 60.0
 
 
-def executable() -> str | None:
-    """Where a Chromium is installed."""
-    return next((path for name in BROWSERS if (path := shutil.which(name))), None)
-
-
 class Page:
     """One open page. `problems` collects errors of scripts, the console and the network."""
 
@@ -154,9 +149,8 @@ class Page:
 @contextmanager
 def chromium(profile: Path) -> Iterator[Page]:
     """A browser of its own with an empty `profile` folder, ended afterwards."""
-    path = executable()
+    path = next(filter(None, map(shutil.which, BROWSERS)), None)
     assert path, "no Chromium is installed"
-    profile.mkdir(parents=True, exist_ok=True)
     with (profile / "log.txt").open("wb") as log:
         process = subprocess.Popen(
             [path, *FLAGS, f"--user-data-dir={profile}"], stdout=log, stderr=log

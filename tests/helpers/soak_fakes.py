@@ -11,12 +11,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from run_fakes import FakePolicy, FakeWorld, parts
+from run_fakes import FakePolicy, FakeWorld
 
 from robospa.harness.world import Poll, StepResult
 from robospa.protocol.policy import TrialInfo
-
-__all__ = ["SoakPolicy", "SoakWorld", "parts"]
 
 STUCK = "SOAK_STUCK"
 """Names the file whose removal, by the first world that sees it, makes that world get stuck."""

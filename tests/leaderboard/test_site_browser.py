@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from devtools import Page, chromium
+from devtools import Page
 from site_fakes import REPLAYED, Weaker, make_submission, many_entries
 
 from robospa.leaderboard.entries import BADGES, entry_of, published_entries
@@ -55,12 +55,6 @@ def pair(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "index.html").write_text(index_page([*entries, *published_entries()]))
     write_pairs(pairs_of(entries), folder, str)
     return folder / "index.html"
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
-    with chromium(tmp_path_factory.mktemp("profile")) as page:
-        yield page
 
 
 @pytest.fixture

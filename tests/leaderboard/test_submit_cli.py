@@ -9,7 +9,7 @@ from bundle_fakes import CARD_TEXT as CARD
 from bundle_fakes import FAKES, PICK, REFERENCE, SEEDS, Weak, make_run
 from command_line import Done, robospa
 from msgspec import to_builtins
-from run_fakes import KEYED, FakePolicy, other, parts
+from run_fakes import FakePolicy, KeyedPolicy, other, parts
 from site_fakes import REPLAYED, make_valid, of_bundle
 
 from robospa.harness.running.evaluate import evaluate
@@ -138,17 +138,10 @@ def test_hidden_seeds_run_against_a_server(packed: Path) -> None:
     assert done.code == 1 and "salt_sha256" in done.err
 
 
-class Curious(Weak):
-    """Asks for what names the scene."""
-
-    def __init__(self) -> None:
-        super().__init__(KEYED)
-
-
 def test_a_server_that_asks_for_the_key_gets_no_hidden_scene(packed: Path, tmp_path: Path) -> None:
     key = TrialKey(PICK, 1, FIRST)
     fakes = {"world": "bundle_fakes:World", "parts": "run_fakes:parts", "workers": 1}
-    with ServerThread(policy_factory=Curious) as server:
+    with ServerThread(policy_factory=KeyedPolicy) as server:
         for policy, words in ((server.url, "the key of every trial"), ("hold", "in the process")):
             asked = {"policy": policy, "out": tmp_path / "run", **fakes}
             settings = updated(EvaluationSettings(), asked)

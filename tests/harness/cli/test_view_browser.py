@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from devtools import Page, chromium
+from devtools import Page
 from fake_runs import EVIL, make_run, shown, write_film
 
 from robospa.harness import report_server as live_report
@@ -19,12 +19,6 @@ pytestmark = pytest.mark.browser
 
 LIVE = "document.getElementById('live').textContent"
 SHOWN = "document.getElementById('count').textContent"
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
-    with chromium(tmp_path_factory.mktemp("profile")) as page:
-        yield page
 
 
 @pytest.fixture

@@ -82,7 +82,7 @@ class Run:
             *(*ROBOSPA, "eval", f"ws://127.0.0.1:{server.port}", "--tasks", "Pick_Blocks_Size"),
             *("--levels", "1-2", "--run-seed", "1", "--trials", str(TRIALS_PER_LEVEL)),
             *("--seeds", f"100000-{99_999 + TRIALS_PER_LEVEL}", "--workers", "2"),
-            *("--world", "soak_fakes:SoakWorld", "--parts", "soak_fakes:parts"),
+            *("--world", "soak_fakes:SoakWorld", "--parts", "run_fakes:parts"),
             *("--backoff", "0.05", "--attempts", "10", "--wait", "60", "--out", str(folder)),
         ]
 

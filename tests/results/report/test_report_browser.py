@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from devtools import Page, chromium
+from devtools import Page
 from fake_runs import EVIL, make_run, shown, write_film
 
 from robospa.results.report.page import write_report
@@ -39,12 +39,6 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "run" / "videos").mkdir()
     write_film(folder / "run" / "videos" / "a b#1.mp4", 6)
     return write_report(make_report(run, ["RDT", "X-VLA"]), folder / "report") / "report.html"
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
-    with chromium(tmp_path_factory.mktemp("profile")) as page:
-        yield page
 
 
 @pytest.fixture(scope="module")
