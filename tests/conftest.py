@@ -24,10 +24,8 @@ HELPERS = Path(__file__).resolve().parent / "helpers"
 LONG = (
     "test_soak",
     "test_every_dialect",
-    "test_replay_dialects",
     "test_faults_every_dialect",
     "test_ray",
-    "test_many_servers",
     "test_pool",
     "test_site",
     "test_eval_cli",

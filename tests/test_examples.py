@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import pytest
 from collect_fakes import FakePool, fake_pack
@@ -24,12 +25,8 @@ EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 
 def run(name: str, *words: str) -> None:
     """`python examples/NAME.py WORDS...`, in this process."""
-    before = sys.argv, list(sys.path)
-    sys.argv = [name, *words]
-    try:
+    with patch.multiple(sys, argv=[name, *words], path=list(sys.path)):
         runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
-    finally:
-        sys.argv, sys.path[:] = before
 
 
 def test_the_page_names_every_script_and_no_other() -> None:
