@@ -114,12 +114,15 @@ class Status:
         if away := [s for s in self.servers if not s.up and not s.excluded]:
             others = "" if len(away) == len(self.servers) else "; the others get its workers"
             return f"{_some(len(away))} away{others}"
-        if self.cores and busy >= FULL * self.cores:
-            full = "the only core" if self.cores == 1 else f"all {self.cores} cores"
-            return f"the simulators are the bottleneck: they fill {full}"
+        slow = ""
         if used and all(s.saturated for s in used) and waiting >= NOTABLE:
             who = "the policy server is" if len(used) == 1 else "the policy servers are"
-            return f"{who} the bottleneck: workers wait {100 * waiting:.0f} % of their time"
+            slow = f"{who} the bottleneck: workers wait {100 * waiting:.0f} % of their time"
+        if self.cores and busy >= FULL * self.cores and not (slow and waiting > MOSTLY):
+            full = "the only core" if self.cores == 1 else f"all {self.cores} cores"
+            return f"the simulators are the bottleneck: they fill {full}"
+        if slow:
+            return slow
         share = f"{100 * waiting:.0f} %"
         if not all("queue" in s.means for s in used):
             return f"workers wait {share} of their time"
@@ -332,8 +335,9 @@ MEMORY = 0.75e9
 """Bytes that a worker may need: simulator, renderer and one batch of images."""
 FULL = 0.9
 """Share of the cores that counts as all of them."""
-NOTABLE = 0.1
-"""Share of its time that a worker has to wait before its server is what a run waits for."""
+NOTABLE, MOSTLY = 0.1, 0.5
+"""Share of its time that a worker has to wait before its server is what a run waits for, and before
+it is so even where the cores are full."""
 
 
 def cores() -> int:

@@ -181,6 +181,8 @@ def test_trials_that_wait_for_each_other_do_not_fill_the_cores() -> None:
     assert "room for more workers" in found.bottleneck
     busy = Status(0.0, 2, 6, 2, (server(),), {**shares, "queueing": 0.0}, places=6)
     assert "the simulators are the bottleneck" in busy.bottleneck
+    slow = Status(0.0, 8, 48, 2, (server(queue=80.0, infer=20.0),), {"waiting": 0.8}, places=48)
+    assert "policy server is the bottleneck" in slow.bottleneck
     assert found.workers_text == "2 workers on 2 cores"
 
 
