@@ -139,17 +139,12 @@ def functions() -> Iterator[tuple[str, Callable[..., object]]]:
 def numbers() -> Iterator[tuple[str, typing.Any]]:
     """Every numeric flag that is no setting of an evaluation, and what it was made with."""
     for command, function in functions():
-        own = [p.name for p in inspect.signature(inspect.unwrap(function)).parameters.values()]
+        kinds = typing.get_type_hints(function)
         hints = typing.get_type_hints(function, include_extras=True)
-        for name in own:
-            hint = hints.get(name)
-            made = getattr(hint, "__metadata__", [None])[-1]
-            kinds = set(
-                typing.get_args(getattr(hint, "__origin__", None))
-                or [getattr(hint, "__origin__", None)]
-            )
-            if kinds & {int, float} and name not in CHECKED_LATER:
-                yield f"{command} --{name}", made
+        for name in inspect.signature(inspect.unwrap(function)).parameters:
+            kind = kinds.get(name)
+            if {int, float} & {kind, *typing.get_args(kind)} and name not in CHECKED_LATER:
+                yield f"{command} --{name}", hints[name].__metadata__[-1]
 
 
 NUMBERS = dict(numbers())

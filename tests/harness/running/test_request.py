@@ -1,13 +1,12 @@
 """From settings to what the driver runs."""
 
 import json
-import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
 
 import pytest
+from command_line import printed
 from msgspec import structs
 from run_fakes import fake_config
 
@@ -173,10 +172,8 @@ for name in sorted(sys.modules):
     if name.startswith("robospa."):
         print(sys.modules[name].__file__)
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    loaded = {Path(line).resolve() for line in printed(code).split()}
     counted = {(ROOT / name).resolve() for name in files_of(ROOT, FOLDERS, LEFT_OUT)}
-    loaded = {Path(line).resolve() for line in done.stdout.split()}
     beside = {path for path in loaded - counted if path.name != "__init__.py"}
     kept = ("results/records/", "tasks/seeds/")
     assert [p for p in beside if not any(name in p.as_posix() for name in kept)] == []

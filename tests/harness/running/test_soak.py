@@ -10,7 +10,6 @@ import random
 import signal
 import socket
 import subprocess
-import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -19,6 +18,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from command_line import ROBOSPA
+
 from robospa.harness.running.atomic_file import PARTIAL
 from robospa.harness.running.record_store import read_trace
 from robospa.harness.trial import actions_digest
@@ -26,7 +27,6 @@ from robospa.results.records.runs import ACTIONS, TRIALS, action_path, finished,
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
-ROBOSPA = [sys.executable, "-m", "robospa.harness.cli.main"]
 UNDECIDED = ("wall_time", "timing", "latency", "attempts", "retries", "video")
 """Fields of a record that may differ from one run to the next."""
 TRIALS_PER_LEVEL = 12
