@@ -1,47 +1,28 @@
-"""`robospa report`: what it refuses, and the failures of a run with their evidence."""
+"""`robospa report`: the failures of a run with their evidence."""
 
 import json
 import shutil
-from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 from command_line import robospa
-from fake_runs import trial_record
+from fake_runs import trial_record, write
 
-from robospa.results.records.runs import to_line
-from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 pytestmark = pytest.mark.usefixtures("same_figures_once")
 
-
 LIFT = {"time": 3.0, "kind": "grasped", "object": "b", "index": -1, "note": "", "step": 4}
-
-
-def record(seed: int, end: str) -> TrialRecord:
-    key = TrialKey("Pick_Blocks_Size", 2, seed)
-    return trial_record(
-        key,
-        end == "success",
-        end=end,
-        candidates=3,
-        steps=9,
-        physics_steps=900,
-        events=(LIFT,),
-        diagnostics={"roles": {"a": [0], "b": []}},
-        video="videos/x.mp4",
-    )
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    records = [record(1, "step_limit"), record(2, "success"), record(3, "infrastructure")]
-    (tmp_path / "trials").mkdir()
-    (tmp_path / "trials" / "0000.jsonl").write_text("".join(map(to_line, records)))
-    row = {k: v for k, v in asdict(records[0].key).items() if k != "seed"}
-    (tmp_path / "run.json").write_text(json.dumps({"trials": [{**row, "seeds": [1, 2, 3]}]}))
-    return tmp_path
+    told = {"candidates": 3, "steps": 9, "physics_steps": 900, "events": (LIFT,)}
+    told |= {"diagnostics": {"roles": {"a": [0], "b": []}}, "video": "videos/x.mp4"}
+    ends = ((1, "step_limit"), (2, "success"), (3, "infrastructure"))
+    keys = {n: TrialKey("Pick_Blocks_Size", 2, n) for n, _ in ends}
+    records = [trial_record(keys[n], end == "success", end=end, **told) for n, end in ends]
+    return write(tmp_path / "run", records).folder
 
 
 def test_failures_are_counted(folder: Path) -> None:
