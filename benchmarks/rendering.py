@@ -53,7 +53,7 @@ def bare_cameras(world: SapienWorld) -> tuple[sapien.Scene, Cameras]:
     for mark in renderer._abreast._marks:  # to SAPIEN's shader they would be lights
         renderer._scene.remove_entity(mark.entity)
     links = [
-        {link: world_pose(entity) for link, entity in entities.items()}
+        {k: Pose(tuple(e.pose.p.tolist()), tuple(e.pose.q.tolist())) for k, e in entities.items()}
         for entities in renderer._robot
     ]
     cameras = []
@@ -68,11 +68,6 @@ def bare_cameras(world: SapienWorld) -> tuple[sapien.Scene, Cameras]:
         renderer._scene.add_entity(mount)
         cameras.append(camera)
     return renderer._scene, cameras
-
-
-def world_pose(entity: sapien.Entity) -> Pose:
-    """Where a drawn body is."""
-    return Pose(tuple(entity.pose.p.tolist()), tuple(entity.pose.q.tolist()))
 
 
 def capture(scene: sapien.Scene, cameras: Cameras) -> list[NDArray[np.uint8]]:

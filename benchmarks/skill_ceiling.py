@@ -23,7 +23,7 @@ from frame import RESULTS, Figure, Json, Result, gather, main
 from numpy.typing import NDArray
 
 from robospa.baselines.oracle import Oracle
-from robospa.geometry import Vec3
+from robospa.geometry import Pose, Vec3
 from robospa.harness.selection import parse_tasks
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import run_trial
@@ -163,15 +163,15 @@ class Shown:
             found["at"] = self.point(call.on)
             if any(call.position[:2]):
                 top = self._support(call.on)
-                found["offset"] = list(np.subtract(self._at(call), top)[:2])
+                found["offset"] = list(np.subtract(top.apply(call.position), top.position)[:2])
             return found
         where = call.position
         if where[2] + model.bottom - self.scene.table_top > 0.004:  # on a thing, off its middle
             below = min(
                 (n for n in self.names if n != call.object and n in self.now.poses),
-                key=lambda n: math.dist(where[:2], self._support(n)[:2]),
+                key=lambda n: math.dist(where[:2], self._support(n).position[:2]),
             )
-            offset = np.subtract(where, self._support(below))[:2]
+            offset = np.subtract(where, self._support(below).position)[:2]
             return {**found, "at": self.point(below), "offset": offset.tolist()}
         seen = self.view.pixel((where[0], where[1], self.scene.table_top))
         height, width = self.ids.shape
@@ -201,14 +201,8 @@ class Shown:
         item = self.scene.object(name)
         return object_model(item.asset, item.params)
 
-    def _support(self, name: str) -> Vec3:
-        return (self.now.poses[name] * self._model(name).frames["support"]).position
-
-    def _at(self, call: plan.Place) -> Vec3:
-        assert call.on is not None
-        return (self.now.poses[call.on] * self._model(call.on).frames["support"]).apply(
-            call.position
-        )
+    def _support(self, name: str) -> Pose:
+        return self.now.poses[name] * self._model(name).frames["support"]
 
 
 @cache

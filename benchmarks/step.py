@@ -26,7 +26,7 @@ from run_fakes import FakeWorld, SumTracker, parts
 from robospa.clients import connect
 from robospa.harness.trial import TrialSetup, run_trial
 from robospa.harness.world import Poll, StepResult
-from robospa.observation import CameraSpec, Observation
+from robospa.observation import Observation
 from robospa.protocol.policy import PolicySpec
 from robospa.tasks.scene import Scene
 from robospa.trial import TrialKey
@@ -55,9 +55,8 @@ class TimedWorld(FakeWorld):
 
     def __init__(self, images: Sequence[NDArray[np.uint8]]) -> None:
         super().__init__()
-        self._images = dict(zip(wire.CAMERAS, images, strict=True))
         self._view: Observation = {
-            "images": self._images,
+            "images": dict(zip(wire.CAMERAS, images, strict=True)),
             "state": np.zeros(14, np.float32),
             "ee": np.zeros((2, 8), np.float32),
         }
@@ -81,9 +80,6 @@ class TimedWorld(FakeWorld):
     def observe(self, spec: PolicySpec) -> Observation:
         self.views += 1
         return self._view.copy()
-
-    def render(self, camera: CameraSpec) -> NDArray[np.uint8]:
-        return self._images[camera.name]
 
 
 def measure(rounds: int = 6) -> Result:

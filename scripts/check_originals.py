@@ -46,10 +46,8 @@ def same(actions: Actions) -> Actions:
 
 def xvla_actions(actions: Actions) -> Actions:
     """Ours as X-VLA's client hands them to RoboTwin: -1 for closed; q and -q are one rotation."""
-    found = actions.copy()
+    found = unsigned(actions)
     found[:, [7, 15]] = 2 * found[:, [7, 15]] - 1
-    for start in (3, 11):
-        found[:, start : start + 4] *= np.sign(found[:, start + 3 : start + 4])
     return found
 
 

@@ -21,12 +21,6 @@ WIDTH, LETTERS = 3.4, 44
 """Of a picture [inches], and how many letters of text fit below it."""
 
 
-def answered(path: Path) -> list[dict[str, object]]:
-    """The lines of a trial whose answers were used."""
-    lines = [json.loads(line) for line in path.read_text().splitlines()]
-    return [line for line in lines if not line["error"]]
-
-
 def draw(axes: Axes, path: Path, line: dict[str, object], feedback: dict[int, str]) -> None:
     """A picture, the calls that were made at it, and their `feedback` by number."""
     first = int(str(line["calls"]))
@@ -54,14 +48,15 @@ def draw(axes: Axes, path: Path, line: dict[str, object], feedback: dict[int, st
 def main(source: str, out: str) -> None:
     """Draw the trial noted down in `source` as the picture `out`."""
     path = Path(source)
-    lines = answered(path)
-    texts = "\n".join(map(str, lines[-1]["question"]))  # type: ignore[call-overload]
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    lines = [line for line in lines if not line["error"]]  # those whose answers were used
+    texts = "\n".join(map(str, lines[-1]["question"]))
     known = [row.partition(". ")[2] for row in texts.splitlines() if row[:1].isdigit()]
     feedback = {n: str(json.loads(row)["feedback"]) for n, row in enumerate(known)}
     figure, grid = pyplot.subplots(1, len(lines), figsize=(WIDTH * len(lines), 0.92 * WIDTH))
     for axes, line in zip([grid] if len(lines) == 1 else grid, lines, strict=True):
         draw(axes, path, line, feedback)
-    figure.suptitle(str(lines[0]["question"][0]), x=0.01, ha="left", fontsize=10)  # type: ignore[index]
+    figure.suptitle(str(lines[0]["question"][0]), x=0.01, ha="left", fontsize=10)
     figure.subplots_adjust(0.01, 0.13, 0.99, 0.93, 0.03)
     figure.savefig(out, dpi=110)
 

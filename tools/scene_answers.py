@@ -123,9 +123,5 @@ def _beside(scene: Scene) -> list[str]:
 def drawn(scene: Scene) -> dict[str, str | int]:
     """The drawn values by name of the fact: ranks, directions, counts, colours."""
     facts = {k: v for k, v in scene.facts.items() if isinstance(v, str | int) and k != "reference"}
-    return {key: _word(scene, value) for key, value in facts.items()}
-
-
-def _word(scene: Scene, value: str | int) -> str | int:
-    names = [o.name for o in scene.objects]
-    return names.index(str(value)) if value in names else value
+    number = {o.name: n for n, o in enumerate(scene.objects)}
+    return {key: number.get(str(value), value) for key, value in facts.items()}

@@ -119,8 +119,6 @@ def small(value: Any) -> Any:
 
 
 OUT = sys.stdout
-
-
 FAILS = int(os.environ.get("ROBOSPA_FAIL_AFTER", "0"))
 """The query at which the model raises; 0: none."""
 queries = itertools.count()
