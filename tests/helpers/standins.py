@@ -436,11 +436,10 @@ class VlaEval(Socket):
 
 
 class RoboTwin(StandIn):
-    """RoboTwin's policy_model_server; `slowly` sends every answer byte by byte."""
+    """RoboTwin's policy_model_server."""
 
     scheme = "robotwin+tcp"
     methods = ("reset_model", "get_action", "update_obs")
-    slowly = False
 
     def listen(self) -> None:
         outer = self
@@ -482,8 +481,7 @@ class RoboTwin(StandIn):
         frame = struct.pack(">I", len(answer)) + answer
         if self.instead is not None and seen["cmd"] == "get_action":
             frame = self.instead
-        for piece in [frame[i : i + 1] for i in range(len(frame))] if self.slowly else [frame]:
-            sock.sendall(piece)
+        sock.sendall(frame)
         return good
 
 
@@ -622,14 +620,14 @@ def talking(server: Any, query: str = "", timeouts: Timeouts = QUICK, **options:
         yield policy
 
 
-def answered(server: Any, query: str = "", seen: Any = None, **options: Any) -> Any:
+def answered(server: Any, query: str = "", **options: Any) -> Any:
     """The chunk that our client gets of `server` to its first question of a trial."""
     with talking(server, query, **options) as policy:
         policy.reset(TRIAL)
-        return policy.infer(observation() if seen is None else seen)
+        return policy.infer(observation())
 
 
-def first_request(server: Any, query: str = "", seen: Any = None) -> Any:
+def first_request(server: Any, query: str = "") -> Any:
     """What our client sends `server` first in a trial; `query` has its options."""
-    answered(server, query, seen)
+    answered(server, query)
     return server.requests[0]

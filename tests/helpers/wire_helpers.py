@@ -76,8 +76,6 @@ class Together(Recall):
         self.batches.append([o["step"] for o in observations])
         self.started.set()
         assert self.open.wait(20)
-        if any(o["instruction"] == "poison" for o in observations):
-            raise ValueError("one sample is bad")
         return [np.full((1, 14), o["step"], np.float32) for o in observations]
 
 

@@ -153,7 +153,7 @@ def test_other_lists_of_changes_are_refused(data: bytes) -> None:
 
 
 def test_what_was_announced_is_downloaded_verified_and_replayed(
-    bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    bundle: Path, tmp_path: Path
 ) -> None:
     asked: list[tuple[str, int]] = []
 

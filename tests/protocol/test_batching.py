@@ -59,18 +59,18 @@ def window() -> AdaptiveBatchWindow:
     return found
 
 
-def used(window: AdaptiveBatchWindow, session: int, pause: float, until: float = 10.0) -> None:
-    """`session` was answered at `until` and has paused `pause` [s] so far, each time; the calls
+def used(window: AdaptiveBatchWindow, session: int, pause: float) -> None:
+    """`session` was answered at t = 10 s and has paused `pause` [s] so far, each time; the calls
     that answered it count for nothing."""
     cost, window.cost = window.cost, CallCost()
-    for number in reversed(range(KEPT + 1)):
-        window.arrived(session, until - number * pause)
-        window.answered([session], until - number * pause, until - number * pause)
+    for time in (10.0 - number * pause for number in reversed(range(KEPT + 1))):
+        window.arrived(session, time)
+        window.answered([session], time, time)
     window.cost = cost
 
 
-def wait(window: AdaptiveBatchWindow, now: float = 10.0, *waiting: int, size: int = 4) -> float:
-    return window.wait_for(now, waiting or (1,), 10.0, size)
+def wait(window: AdaptiveBatchWindow, now: float = 10.0, *waiting: int) -> float:
+    return window.wait_for(now, waiting or (1,), 10.0, 4)
 
 
 def test_a_session_that_is_due_soon_is_waited_for(window: AdaptiveBatchWindow) -> None:

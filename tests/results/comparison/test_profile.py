@@ -67,12 +67,12 @@ def shaky(axis: str, target: str, rng: np.random.Generator) -> tuple[str | None,
     return reads(axis, target, rng)[0], 0.3 if axis == "action-noise=10" else 0.8
 
 
-def simulated(policy: Policy, seed: int, trials: int = 50) -> Run:
+def simulated(policy: Policy, seed: int) -> Run:
     rng = np.random.default_rng(seed)
     records = []
     for axis in ("clean", *AXES):
         target = "object_1" if axis == "other-target" else "object_0"
-        for n in range(trials):
+        for n in range(50):
             took, chance = policy(axis, target, rng)
             records.append(trial(axis, n, took, rng.random() < chance, target))
     return run_of(records)

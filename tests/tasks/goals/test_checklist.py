@@ -13,7 +13,7 @@ from robospa.tasks.goals.clicks import ClickInOrder, PressCounts
 from robospa.tasks.goals.conditions import Container, Inside, Region, Rests, level_with, on_spot
 from robospa.tasks.goals.counters import PressCounter
 from robospa.tasks.goals.placing import collect, gather, nest, row, stack
-from robospa.tasks.snapshot import Contact, Snapshot
+from robospa.tasks.snapshot import Snapshot
 
 START: dict[str, Vec3] = {
     "can": (-0.1, -0.1, 0.74),
@@ -35,20 +35,16 @@ def goal() -> Checklist:
     return Checklist([counter, bread, counter], released=True, early=early, figures=CHAIN)
 
 
-def click(bread: Vec3 = START["bread"], gripper: float = 0.0) -> list[Snapshot]:
+def click() -> list[Snapshot]:
     """A touch of the can and 0.1 s after it."""
-    scene = dict(START, bread=bread)
-    touch = snap(0, scene, (gripper, 1.0), touched=[("can", TIP)])
-    return [touch, *[snap(0, scene, (gripper, 1.0))] * 6]
-
-
-def put(bread: Vec3 = IN_BASKET) -> list[Snapshot]:
-    return [snap(0, dict(START, bread=bread))] * 2
+    touch = snap(0, START, (0.0, 1.0), touched=[("can", TIP)])
+    return [touch, *[snap(0, START, (0.0, 1.0))] * 6]
 
 
 def test_all_clicks_first_succeeds_too_but_is_noted() -> None:
     tracker = goal()
-    events = play(tracker, START, *click(), *click(), *put())
+    put = dict(START, bread=IN_BASKET)
+    events = play(tracker, START, *click(), *click(), put, put)
     assert "success" in kinds(events)
     assert [e.index for e in events if e.kind == "wrong_order"] == [2]
     assert tracker.diagnostics()["order_obeyed"] is False
@@ -89,13 +85,9 @@ def presses(times: int) -> Checklist:
     return Checklist([counters.PressCounter("s", FRAME)] * times, figures=counters.FIGURES)
 
 
-def touches(pattern: str, point: Vec3 = PRESSED) -> list[Snapshot]:
-    """One snapshot a character: "x" touches, "n" comes near, anything else does neither."""
-    contacts = {
-        "x": (Contact("left_gripper", "s", point),),
-        "n": (Contact("left_gripper", "s", point, touching=False),),
-    }
-    return [replace(snap(0, AT), contacts=contacts.get(mark, ())) for mark in pattern]
+def touches(pattern: str) -> list[Snapshot]:
+    """One snapshot a character, of which "x" touches."""
+    return [snap(0, AT, touched=[("s", PRESSED)] * (mark == "x")) for mark in pattern]
 
 
 @pytest.mark.parametrize(
@@ -168,8 +160,8 @@ def fan(times: int) -> Checklist:
     return Checklist([counter] * times, radius=counter.radius, figures=("lifts", "released"))
 
 
-def at(rise: float, aside: float = 0.0) -> dict[str, Vec3]:
-    return {"f": (HOME[0] + aside, HOME[1], HOME[2] + rise)}
+def at(rise: float) -> dict[str, Vec3]:
+    return {"f": (HOME[0], HOME[1], HOME[2] + rise)}
 
 
 def test_lowering_without_letting_go_counts_and_is_told_apart() -> None:

@@ -168,30 +168,18 @@ def test_clutter_is_called_so() -> None:
 NAMES = ("object_0", "object_1", "object_2")
 LOW: Mapping[str, Vec3] = {n: (0.2 * i - 0.2, 0.0, 0.76) for i, n in enumerate(NAMES)}
 PICKED = ["grasped", "subtask_done", "success"]
-HIGH, RISE, STEADY = Lift(above=0.82), Lift(rise=0.06), Lift(rise=0.04, steady=0.03)
+HIGH = Lift(above=0.82)
 
 
-def raised(
-    name: str = "object_0",
-    height: float = 0.1,
-    time: float = 0.02,
-    gripper: float = 0.0,
-    carried: bool = True,
-    touched: bool = False,
-    **others: float,
-) -> Snapshot:
-    """`name` (and others) lifted by `height` [m], between the left arm's fingers if carried."""
-    positions = dict(LOW)
-    for other, rise in {name: height, **others}.items():
-        x, y, z = positions[other]
-        positions[other] = (x, y, z + rise)
-    point = positions[name]
-    contacts = [(name, point)] if touched else []
-    return snap(time, positions, (gripper, 1.0), held(point) if carried else AWAY, contacts)
+def raised(name: str = "object_0", time: float = 0.02) -> Snapshot:
+    """`name` lifted by 0.1 m, between the left arm's fingers."""
+    x, y, z = LOW[name]
+    point = (x, y, z + 0.1)
+    return snap(time, {**LOW, name: point}, (0.0, 1.0), held(point))
 
 
-def tracker(lift: Lift = HIGH) -> PickTracker:
-    return PickTracker("object_0", NAMES, lift)
+def tracker() -> PickTracker:
+    return PickTracker("object_0", NAMES, HIGH)
 
 
 def test_nothing_after_success_and_a_second_start_forgets_the_first() -> None:
