@@ -328,7 +328,7 @@ def judge(
     views = [view for view in VIEWS if view.name in shown]
     singles = list(_tried(cases, None, parts, before, 1))
     singles += [_guess((), view, shown[view.name], before) for view in views]
-    guesses = sorted((g for g in singles if g is not None), key=lambda g: g.score)
+    guesses = sorted(singles, key=lambda guess: guess.score)
     more: list[Guess] = []
     if min(guess.score for guess in (base, *guesses)) > EXPLAINED:  # perhaps two at once
         more += _tried(cases, None, parts, before, 2)

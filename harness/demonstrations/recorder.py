@@ -63,8 +63,7 @@ class RecordedFrame:
 
 
 class FrameRecorder(Recorder):
-    """Keeps a frame every `stride` physics steps of an
-    action, and at its end.
+    """Keeps a frame every `stride` physics steps of an action, and at its end.
 
     A frame less than half a stride before an action's end is replaced by that one. `stride` is
     counted in polls: a multiple of 5. With `KEYFRAMES` for it, frames are kept only where actions

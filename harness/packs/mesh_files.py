@@ -171,7 +171,7 @@ def _parts(path: Path, inside: Callable[[Path], Path], by_node: bool = False) ->
         points = np.asarray(part.vertices)
         if not np.isfinite(points).all() or np.abs(points).max() > 1e6:
             raise ArchiveError(f"{str(path)!r} has vertices at places that no object can have")
-        if len(part.faces) and (part.faces.min() < 0 or part.faces.max() >= len(points)):
+        if part.faces.min() < 0 or part.faces.max() >= len(points):
             raise ArchiveError(f"{str(path)!r} has triangles of vertices that do not exist")
     if sum(len(part.vertices) + len(part.faces) // 2 for part in parts) > 2 * MOST_VERTICES:
         raise ArchiveError(f"{str(path)!r} has more than {MOST_VERTICES} vertices")
