@@ -113,8 +113,17 @@ def test_tasks_with_the_same_results(tmp_path: Path) -> None:
     [
         (outcomes(SIZE, 1, [1, 0, 1]) + [record(BOTTLES, 2, n, 1, 2) for n in range(3)], []),
         (outcomes(SIZE, 1, [1, 0]) + outcomes(SIZE, 2, [1]), ["unequal-trials"]),
-        # few successes may agree by chance
+        # few successes may agree by chance, and few failures
         ([r for task in (SIZE, MUGS) for n in (1, 2) for r in outcomes(task, n, [1, 0])], []),
+        (
+            [
+                r
+                for task in (SIZE, MUGS)
+                for n in (1, 2, 3)
+                for r in outcomes(task, n, [0] * n + [1] * (60 - n))
+            ],
+            [],
+        ),
     ],
 )
 def test_whole_runs(tmp_path: Path, records: list[TrialRecord], found: list[str]) -> None:
