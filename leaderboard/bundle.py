@@ -27,7 +27,6 @@ from msgspec import Struct, to_builtins
 
 from robospa.results.records.manifest import RunManifest
 from robospa.schema import Sha256, parse_json
-from robospa.trial import TrialKey
 
 IN_REPOSITORY = "bundle.zip"
 """Name of a bundle in its submission's folder, and its address in `bundle.txt`."""
@@ -107,11 +106,6 @@ def most_bytes(name: str) -> int | None:
 def actions_name(task: str, level: int) -> str:
     """Where the actions of a variant lie."""
     return f"actions/{task}-L{level}.bin"
-
-
-def video_name(key: TrialKey) -> str:
-    """Where the film of a trial lies."""
-    return f"videos/{key.slug}.mp4"
 
 
 def canonical(value: object) -> bytes:

@@ -6,7 +6,6 @@ scenes. Those that are replayed follow from a value that nobody can know before 
 in. `evidence.json` is what `robospa submit` writes of both.
 """
 
-import hashlib
 import math
 import re
 from collections.abc import Iterable, Sequence
@@ -24,7 +23,7 @@ from robospa.leaderboard.agreement import (
     agreement,
     contradictions,
 )
-from robospa.leaderboard.bundle import IN_REPOSITORY, BundleError
+from robospa.leaderboard.bundle import IN_REPOSITORY, BundleError, sha256
 from robospa.leaderboard.card import LINK
 from robospa.results.records.manifest import Processor
 from robospa.schema import Count, Number, one_of, pattern, read
@@ -47,7 +46,7 @@ def announced(suite: str, keys: Iterable[TrialKey]) -> list[TrialKey]:
     """The trials that are filmed: one of every base task, by the hash of suite and scene."""
     first: dict[str, tuple[str, TrialKey]] = {}
     for key in keys:
-        rank = (_hash(f"{suite}/{key.task}/{key.level}/{key.seed}"), key)
+        rank = (sha256(f"{suite}/{key.task}/{key.level}/{key.seed}".encode()), key)
         first[key.task] = min(first.get(key.task, rank), rank)
     return [key for _, key in sorted(first.values(), key=lambda pair: pair[1])]
 
@@ -69,7 +68,7 @@ def drawn(challenge: str, bundle: str, keys: Sequence[TrialKey], count: int) -> 
     """
     check_challenge(challenge)
     seed = f"{challenge.strip()}/{bundle}"
-    return sorted(keys, key=lambda key: _hash(f"{seed}/{key.slug}"))[:count]
+    return sorted(keys, key=lambda key: sha256(f"{seed}/{key.slug}".encode()))[:count]
 
 
 def least_sample(trials: int) -> int:
@@ -113,10 +112,6 @@ def what_it_catches(trials: int, sampled: int) -> str:
         "The chance that such a sample holds one of the outcomes, if some were invented: "
         f"{', '.join(words)}."
     )
-
-
-def _hash(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 BADGES = ("valid", "replayed", "reproduced")

@@ -31,7 +31,7 @@ from robospa.leaderboard.traces import Trace, encode, with_joints
 from robospa.leaderboard.trial_rows import TrialRow, trace_hash, write_rows
 from robospa.leaderboard.verify import Valid, check_run, outcomes_of, scores_of, verify
 from robospa.results.records.manifest import PolicySettings, RunAbout, make_manifest
-from robospa.results.records.runs import Run, action_path, by_setting, read_run
+from robospa.results.records.runs import Run, action_path, by_setting, film_name, read_run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.report.page import own_version
 from robospa.trial import TrialKey, path_part
@@ -251,7 +251,7 @@ def _add_actions(
         traces = {key: trace(key) for key in group}
         writer.add(layout.actions_name(*variant), encode(list(traces.values())))
         for key, actions in traces.items():
-            film = layout.video_name(key)
+            film = film_name(key)
             record = replace(run.records[key], video=film if film in films else "")
             rows.append(TrialRow(record, trace_hash(actions)))
     return rows
@@ -273,7 +273,7 @@ def _films(
     world: World | None = None
     try:
         for number, key in enumerate(chosen, 1):
-            name = layout.video_name(key)
+            name = film_name(key)
             there = homes[key] / name
             if run.records[key].video and there.is_file():
                 films[name] = there.read_bytes()

@@ -28,7 +28,7 @@ from robospa.leaderboard.trial_rows import check_record, check_trace, read_rows,
 from robospa.results.comparison.compare import Difference, compare_results, over_levels
 from robospa.results.lint import lint_run
 from robospa.results.records.manifest import RunManifest, RunSettings, seed_hash
-from robospa.results.records.runs import Run
+from robospa.results.records.runs import Run, film_name
 from robospa.results.records.trial_record import EventRow, TrialRecord
 from robospa.results.scoring.first_choice import first_choice, held_at_start
 from robospa.results.scoring.models import IncomparableError, ModelResults, results_of_records
@@ -315,7 +315,7 @@ def _check_videos(
     records: Mapping[TrialKey, TrialRecord],
 ) -> None:
     """BundleError unless the announced trials, and only they, have a video."""
-    chosen = {layout.video_name(key): key for key in announced(manifest.suite, records)}
+    chosen = {film_name(key): key for key in announced(manifest.suite, records)}
     for name, key in chosen.items():
         if name not in manifest.files:
             if manifest.practice:

@@ -15,7 +15,7 @@ from robospa.results.failures.labels import NAMES, FailedTrials, failed_trials, 
 from robospa.results.records.action_problems import KINDS, described
 from robospa.results.records.runs import Run, finished, read_run
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.report.run_card import run_html, run_table
+from robospa.results.report.run_card import NOT_RUN, run_html, run_table
 from robospa.results.scoring.comparable import (
     asked_again,
     comparable,
@@ -118,8 +118,6 @@ def load_run(folder: str | Path) -> LoadedRun:
 
 
 Cell = str | int | float | bool | None
-NOT_RUN = "not run"
-"""The `end` of a listed trial without a record."""
 
 KEY_COLUMNS = ("task", "level", "seed", "embodiment", "mode", "split")
 COUNTS = (

@@ -49,11 +49,6 @@ class Setting:
     clock: tuple[str, ...] = ()
     track: tuple[str, ...] = (JOINTS,)
 
-    def mixed(self) -> list[tuple[str, tuple[str, ...]]]:
-        """The parts that have several values, with these."""
-        parts = ("embodiment", "mode", "split", "track")
-        return [(name, values) for name in parts if len(values := getattr(self, name)) > 1]
-
 
 PAUSED = "paused"
 """The clock of the benchmark: the simulation waits for the policy."""
@@ -79,11 +74,12 @@ def check_same(settings: Iterable[tuple[str, Setting]], parts: Sequence[str]) ->
     """
     known = list(settings)
     for name, setting in known:
-        for part, values in setting.mixed():
-            raise IncomparableError(
-                f"{name} mixes {RAN_WITH[part].format(', '.join(values[:-1]), values[-1])}, whose "
-                "mean means nothing: evaluate one at a time"
-            )
+        for part in ("embodiment", "mode", "split", "track"):
+            if len(values := getattr(setting, part)) > 1:
+                what = RAN_WITH[part].format(", ".join(values[:-1]), values[-1])
+                raise IncomparableError(
+                    f"{name} mixes {what}, whose mean means nothing: evaluate one at a time"
+                )
     for part in parts:
         found: dict[str | float, str] = {}
         for name, setting in known:
@@ -214,21 +210,15 @@ def check_alike(models: Sequence[ModelResults], parts: Sequence[str]) -> None:
     if len(runs) < len(models) and all(map(in_official_world, runs)):
         shared = [part for part in shared if part != "suite"]
     check_same([(m.name, m.setting) for m in runs], shared)
-    if any(m.published for m in models):
-        _check_timing(models)
+    if len(runs) < len(models):
+        for run in runs:
+            if run.manifest.control != REST_TO_REST:
+                raise IncomparableError(
+                    f"{run.name} is of the suite {run.manifest.suite}, whose actions have a fixed "
+                    "duration, and published numbers are of actions from rest to rest: compare it "
+                    "with another run at its rate"
+                )
         check_same([(m.name, m.setting) for m in models], BESIDE_PAPER)
-
-
-def _check_timing(models: Sequence[ModelResults]) -> None:
-    """IncomparableError for a run whose actions have a duration of their own, beside published
-    models, whose actions go from rest to rest."""
-    for model in models:
-        if not model.published and model.manifest.control != REST_TO_REST:
-            raise IncomparableError(
-                f"{model.name} is of the suite {model.manifest.suite}, whose actions have a fixed "
-                "duration, and published numbers are of actions from rest to rest: compare it "
-                "with another run at its rate"
-            )
 
 
 def results_of_run(run: Run, name: str = "", ci: str = METHODS[0]) -> ModelResults:
