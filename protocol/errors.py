@@ -61,12 +61,12 @@ def without_secrets(text: str) -> str:
     return _SECRET_VALUE.sub(r"\1***", _USER.sub(r"\1***@", text))
 
 
-def json_values(value: object, most: int = MAX_JSON) -> object:
+def json_values(value: object) -> object:
     """A decoded value as JSON values, for the record of a run: arrays as lists, numbers that JSON
-    does not have as text; a note in its place if that has more than `most` characters."""
+    does not have as text; a note in its place if that has more than MAX_JSON characters."""
     found = _plain(value)
     text = json.dumps(found, sort_keys=True)
-    if len(text) <= most:
+    if len(text) <= MAX_JSON:
         return found
     digest = hashlib.sha256(text.encode()).hexdigest()[:16]
     return f"left out: {len(text)} characters, sha256 {digest}"

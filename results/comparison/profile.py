@@ -182,13 +182,13 @@ def pairs_of(run: Run) -> tuple[list[TrialRecord], dict[str, list[Pair]]]:
     }
 
 
-def flipped(run: Run, metric: str = "sr1") -> list[tuple[str, Pair]]:
+def flipped(run: Run) -> list[tuple[str, Pair]]:
     """Pairs of which one trial alone succeeded, with their axis: at most MOST_SHOWN of each, lost
     and won in turn. Axes under which nothing that reads succeeds have none."""
     found = []
     for axis, pairs in pairs_of(run)[1].items():
         lost, won = (
-            [p for p in pairs if succeeded(p[n], metric) and not succeeded(p[1 - n], metric)]
+            [p for p in pairs if succeeded(p[n], "sr1") and not succeeded(p[1 - n], "sr1")]
             for n in (0, 1)
         )
         mixed = [pair for turn in zip_longest(lost, won) for pair in turn if pair is not None]

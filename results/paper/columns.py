@@ -257,15 +257,15 @@ def idle_column(runs: Sequence[Column]) -> Column | None:
     return Column(results, idle=True) if cells else None
 
 
-def published_column(model: str, name: str = "", ci: str = intervals.METHODS[0]) -> Column:
+def published_column(model: str, name: str = "") -> Column:
     """A published model as a column, called `name` or as the paper writes it."""
-    results = published_results(model, ci)
+    results = published_results(model)
     return Column(replace(results, name=name) if name else results)
 
 
-def run_column(run: Run, name: str = "", ci: str = intervals.METHODS[0]) -> Column:
+def run_column(run: Run, name: str = "") -> Column:
     """`run` as a column, called `name` or as its policy; see `column_of`."""
-    return column_of(models.results_of_run(run, name or run.manifest.policy.name, ci))
+    return column_of(models.results_of_run(run, name or run.manifest.policy.name))
 
 
 def column_of(results: models.ModelResults) -> Column:

@@ -15,7 +15,6 @@ from robospa.results.records.runs import Run, finished
 from robospa.results.records.trial_record import RetryRow, TrialRecord
 from robospa.results.scoring.first_choice import first_choice
 from robospa.results.scoring.scores import Scores, score
-from robospa.results.statistics.intervals import METHODS
 from robospa.trial import TrialKey
 
 
@@ -47,10 +46,10 @@ def with_repeated_failed(
     }
 
 
-def worst_case(run: Run, ci: str = METHODS[0]) -> Scores:
+def worst_case(run: Run) -> Scores:
     """The scores of `run` if every repeated trial had failed. What missing trials leave open is in
     their `bounds`, as always."""
-    return score(run.keys, with_repeated_failed(run.records), run.manifest.categories, ci)
+    return score(run.keys, with_repeated_failed(run.records), run.manifest.categories)
 
 
 MOST_REPEATED = 0.01

@@ -36,12 +36,12 @@ class Estimate:
     method: str = ""
 
 
-def wilson(successes: float, trials: float, z: float = Z95) -> Estimate:
+def wilson(successes: float, trials: float) -> Estimate:
     """Rate of `successes` in `trials` with Wilson's interval; ValueError if there are no trials."""
     _check(successes, trials)
-    p, zz = successes / trials, z * z / trials
+    p, zz = successes / trials, Z95 * Z95 / trials
     centre = (p + zz / 2) / (1 + zz)
-    half = z / (1 + zz) * math.sqrt(p * (1 - p) / trials + zz / (4 * trials))
+    half = Z95 / (1 + zz) * math.sqrt(p * (1 - p) / trials + zz / (4 * trials))
     low = 0.0 if successes == 0 else max(0.0, centre - half)
     high = 1.0 if successes == trials else min(1.0, centre + half)
     return Estimate(p, low, high, "Wilson")
@@ -123,7 +123,7 @@ def difference(first: Estimate, second: Estimate) -> Estimate:
     return Estimate(value, value - down, value + up, mover_name([first, second]))
 
 
-def paired_difference(only_first: int, only_second: int, trials: int, z: float = Z95) -> Estimate:
+def paired_difference(only_first: int, only_second: int, trials: int) -> Estimate:
     """Rate of the first minus rate of the second on the same seeds: Tango's score interval.
 
     Of `trials` pairs, `only_first` succeeded for the first alone, `only_second` for the second
@@ -141,8 +141,8 @@ def paired_difference(only_first: int, only_second: int, trials: int, z: float =
         return (b - c - n * d) / math.sqrt(spread) if spread > 0 else math.copysign(1e9, b - c - d)
 
     value = (b - c) / n
-    low = -1.0 if b - c == -n else _root(lambda d: score(d) - z, -1.0, value)
-    high = 1.0 if b - c == n else _root(lambda d: score(d) + z, value, 1.0)
+    low = -1.0 if b - c == -n else _root(lambda d: score(d) - Z95, -1.0, value)
+    high = 1.0 if b - c == n else _root(lambda d: score(d) + Z95, value, 1.0)
     return Estimate(value, low, high, "Tango")
 
 
