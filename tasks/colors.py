@@ -113,7 +113,7 @@ _WORDS, _VALUES = tuple(NAMED), np.array(list(NAMED.values()))
 _TABLE = lab(shown(TABLE_COLOR))
 
 
-def stands_out(color: Color, least: float = 16.0) -> bool:
-    """Whether lit and shaded faces of this colour differ from the table by `least`."""
+def stands_out(color: Color) -> bool:
+    """Whether lit and shaded faces of this colour differ from the table by 16."""
     faces = np.stack([shown(color, LIT), shown(color, SHADED)])
-    return bool((difference(lab(faces), _TABLE) >= least).all())
+    return bool((difference(lab(faces), _TABLE) >= 16.0).all())

@@ -250,13 +250,10 @@ class Layer(conditions.Condition):
     within: float
 
     def holds(self, snapshot: Snapshot, before: bool) -> bool:
-        x, y, z = here = snapshot.position(self.name)
+        here = snapshot.position(self.name)
         below = snapshot.position(self.below)
-        in_place = (
-            abs(z - snapshot.height(self.bottom) - self.rise) <= self.within
-            and abs(x - below[0]) < SIDE_TOLERANCE
-            and abs(y - below[1]) < SIDE_TOLERANCE
-        )
+        high = abs(here[2] - snapshot.height(self.bottom) - self.rise) <= self.within
+        in_place = high and _over(here, below, SIDE_TOLERANCE)
         return in_place and (before or not closed_near(snapshot, here, PART_RADIUS))
 
 

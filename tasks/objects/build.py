@@ -150,9 +150,9 @@ def _ball(sphere: Sphere) -> Array:
     return np.asarray(rows) * sphere.radius
 
 
-def _round_up(value: float, digits: int = 4) -> float:
-    """`value` rounded up, so that a bound stays a bound."""
-    return math.ceil(value * 10.0**digits - 1e-6) / 10.0**digits
+def _round_up(value: float) -> float:
+    """`value` rounded up to four digits, so that a bound stays a bound."""
+    return math.ceil(value * 10.0**4 - 1e-6) / 10.0**4
 
 
 def model(
@@ -170,12 +170,8 @@ def model(
     """The finished object; its size, radius and bottom are measured from its shapes, closed."""
     points = np.concatenate([points_of(p) for p in (*parts, *(hinge.shapes if hinge else ()))])
     span = points.max(axis=0) - points.min(axis=0)
-    frames = {}
-    if support is None:
-        support = (0.0, 0.0, float(points[:, 2].max()))
-    frames["support"] = Pose(support)
-    frames["press"] = Pose(press if press is not None else support)
-    frames["touched"] = frames["press"]
+    top = Pose(support or (0.0, 0.0, float(points[:, 2].max())))
+    pressed = Pose(press) if press else top
     return ObjectModel(
         asset=asset,
         shapes=tuple(parts),
@@ -187,7 +183,7 @@ def model(
         mass=mass,
         friction=friction,
         grasps=tuple(grasps),
-        frames=frames,
+        frames={"support": top, "press": pressed, "touched": pressed},
         hinge=hinge,
     )
 
@@ -207,12 +203,8 @@ def top_grasp(
 
 def box_grasps(hx: float, hy: float, z: float, tilt: float = 0.7) -> tuple[Grasp, ...]:
     """Grasps of an upright box of half sizes `hx`, `hy` with the fingertips at height `z`."""
-    found = []
-    if 2 * hx <= MAX_WIDTH:
-        found.append(top_grasp((0.0, 0.0, z), 2 * hx, 0.0, tilt))
-    if 2 * hy <= MAX_WIDTH:
-        found.append(top_grasp((0.0, 0.0, z), 2 * hy, math.pi / 2, tilt))
-    return tuple(found)
+    ways = ((2 * hx, 0.0), (2 * hy, math.pi / 2))
+    return tuple(top_grasp((0.0, 0.0, z), w, a, tilt) for w, a in ways if w <= MAX_WIDTH)
 
 
 def round_grasps(width: float, z: float, tilt: float = 0.7, count: int = 4) -> tuple[Grasp, ...]:
@@ -226,14 +218,14 @@ SIDE_SLOPE = 1.05
 """How far a grasp from the side leans away from straight down [rad]."""
 
 
-def side_grasps(width: float, z: float, tilt: float = 0.4, count: int = 12) -> tuple[Grasp, ...]:
-    """Grasps of something round and tall, `width` thick at height `z`, from `count` sides."""
+def side_grasps(width: float, z: float) -> tuple[Grasp, ...]:
+    """Grasps of something round and tall, `width` thick at height `z`, from twelve sides."""
     found = []
-    for i in range(count):
-        a = 2 * math.pi * i / count
+    for i in range(12):
+        a = 2 * math.pi * i / 12
         c, s = round(math.cos(a), 9), round(math.sin(a), 9)
         out, down = math.sin(SIDE_SLOPE), math.cos(SIDE_SLOPE)
-        found.append(top_grasp((0.0, 0.0, z), width, a, tilt, (s * out, -c * out, -down)))
+        found.append(top_grasp((0.0, 0.0, z), width, a, 0.4, (s * out, -c * out, -down)))
     return tuple(found)
 
 

@@ -129,13 +129,13 @@ def _area(ring: Sequence[Vec3]) -> float:
     return float(np.sum(p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0])) / 2
 
 
-def lathe(profile: Polygon, n: int = 14, caps: bool = True, turn: float = 0.0) -> Mesh:
+def lathe(profile: Polygon, n: int = 14, caps: bool = True) -> Mesh:
     """Surface of revolution about z of `profile` = (radius, z) points.
 
     The outside lies to the right of the profile's direction of travel: outer walls run upwards,
     inner walls downwards. With `caps` an end of non-zero radius is closed by a flat disc.
     """
-    rings = [[(x, y, z) for x, y in ellipse(r, r, n, turn)] for r, z in profile]
+    rings = [[(x, y, z) for x, y in ellipse(r, r, n)] for r, z in profile]
     return loft(rings, caps)
 
 
