@@ -33,8 +33,9 @@ MUG_X, MUG_Y, MUG_YAW = (0.05, 0.20), (-0.20, -0.05), 1.57
 RACK_X, RACK_Y, RACK_YAW = (0.10, 0.30), (0.13, 0.17), 0.2
 RACK_TURN = -0.935
 """The peg points towards the robot's left (official); the yaw is added to it [rad]."""
-RACK_SEEN = (0.055, 0.116)
-"""Radius and height [m] of the part of the rack that has to be in view."""
+RACK_SEEN = (0.116, 0.055)
+"""Height and radius [m] of the part of the rack that has to be in view: foot and peg, not the head
+of the post."""
 BLOCK_X, BLOCK_YAW, DISTANCE = (-0.28, -0.05), 0.75, 0.1
 BLOCK_Y = {2: (0.0, 0.2), 3: (-0.2, 0.2), 4: (-0.2, 0.2), 5: (-0.2, 0.2)}
 MIDDLE = 0.15
@@ -70,7 +71,9 @@ class Facts(SceneFacts):
 def _items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[table.Item]:
     mug, rack = table.draw_variant(rng, "mug"), table.draw_variant(rng, "mug_rack")
     at = free_point(rng, MUG_X, MUG_Y, allowed=table.in_view(workcell, "mug", mug))
-    stand = free_point(rng, RACK_X, RACK_Y, allowed=partial(_rack_seen, workcell))
+    stand = free_point(
+        rng, RACK_X, RACK_Y, allowed=lambda point: table.point_in_view(workcell, point, *RACK_SEEN)
+    )
     if math.dist(at, stand) < table.radius("mug", mug) + table.radius("mug_rack", rack):
         raise NoRoom("the mug is too near to the rack")
     turn = rng.uniform(-MUG_YAW, MUG_YAW)
@@ -83,12 +86,6 @@ def _items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[tab
         yaw = rng.uniform(-BLOCK_YAW, BLOCK_YAW)
         items.append(table.block(color, points[-1], HALF, COLORS[color], yaw))
     return items
-
-
-def _rack_seen(workcell: Workcell, point: Point) -> bool:
-    """Whether foot and peg are in the head image; the head of the post is above it."""
-    x, y = np.array(point[0]), np.array(point[1])
-    return bool(workcell.in_view(x, y, *RACK_SEEN, margin=(0.0, 0.0)))
 
 
 def _block_point(

@@ -81,7 +81,7 @@ def _usable(workcell: Workcell, point: Point) -> bool:
     return (
         abs(point[0]) >= MIDDLE
         and reachable(workcell, point)
-        and table.middle_in_view(workcell, point, HALF_HEIGHT)
+        and table.point_in_view(workcell, point, HALF_HEIGHT)
     )
 
 
@@ -193,7 +193,7 @@ def _items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[tab
             if not reachable(workcell, point):
                 return False
             if asset == "bottle":
-                return table.middle_in_view(workcell, point, HALF_HEIGHT)
+                return table.point_in_view(workcell, point, HALF_HEIGHT)
             return point[0] - wide > TABLE_LEFT + EDGE and seen(point)
 
         point = free_point(rng, x, y, far, allowed=allowed)

@@ -145,18 +145,13 @@ def thing(
 def in_view(workcell: Workcell, asset: str, params: Params) -> Callable[[Point], bool]:
     """Whether the head camera sees the whole asset when it stands at a point."""
     model = objects.object_model(asset, params)
-
-    def seen(point: Point) -> bool:
-        x, y = np.array(point[0]), np.array(point[1])
-        return bool(workcell.in_view(x, y, model.radius, model.size[2], (0.0, 0.0)))
-
-    return seen
+    return lambda point: point_in_view(workcell, point, model.size[2], model.radius)
 
 
-def middle_in_view(workcell: Workcell, point: Point, height: float) -> bool:
-    """Whether the head camera sees what is `height` [m] above the table at a point."""
+def point_in_view(workcell: Workcell, point: Point, height: float, radius: float = 0.0) -> bool:
+    """Whether the head camera sees what is up to `height` [m] above the table around a point."""
     x, y = np.array(point[0]), np.array(point[1])
-    return bool(workcell.in_view(x, y, 0.0, height, (0.0, 0.0)))
+    return bool(workcell.in_view(x, y, radius, height, (0.0, 0.0)))
 
 
 def side(x: float) -> str:

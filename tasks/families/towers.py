@@ -137,7 +137,7 @@ def _draw_colors(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
         return abs(point[0]) >= 0.05 and places.apart(point, [(0.0, -0.10)], 0.10)
 
     def allowed(point: places.Point) -> bool:
-        return (level > 1 or away(point)) and table.middle_in_view(workcell, point, COLOR_HALF)
+        return (level > 1 or away(point)) and table.point_in_view(workcell, point, COLOR_HALF)
 
     points = places.scatter_points(rng, level, X, Y, DISTANCE, allowed, near_middle=True)
     items = [
