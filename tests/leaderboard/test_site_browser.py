@@ -67,13 +67,14 @@ def page(browser: Page, site: Path) -> Iterator[Page]:
     assert browser.problems == []
 
 
-def choose(page: Page, form: str, name: str, value: str) -> None:
-    """Choose in a form as a user does."""
-    page.run(
-        f"(() => {{ const e = document.getElementById('{form}').elements['{name}'];"
-        f"e.type === 'checkbox' ? e.checked = {str(value == 'on').lower()} : e.value = '{value}';"
-        "e.dispatchEvent(new Event('input', {bubbles: true})); })()"
-    )
+def choose(page: Page, form: str, **values: str) -> None:
+    """Choose in a form as a user does, one after the other."""
+    for name, value in values.items():
+        page.run(
+            f"(() => {{ const e = document.getElementById('{form}').elements['{name}']; e.type === "
+            f"'checkbox' ? e.checked = {str(value == 'on').lower()} : e.value = '{value}';"
+            "e.dispatchEvent(new Event('input', {bubbles: true})); })()"
+        )
 
 
 def column(page: Page, name: str) -> list[str]:
@@ -98,7 +99,7 @@ def test_a_name_that_is_a_script_stays_text(page: Page) -> None:
 
 
 def test_columns_sort_both_ways_by_click_and_key(page: Page) -> None:
-    choose(page, "filter", "mode", "randomised")
+    choose(page, "filter", mode="randomised")
     page.click("#board th[data-name=spatial] button")
     values = [float(text) for text in column(page, "spatial")]
     assert values == sorted(values, reverse=True)
@@ -114,12 +115,11 @@ def test_columns_sort_both_ways_by_click_and_key(page: Page) -> None:
 
 
 def test_filters_work_together_and_are_cleared(page: Page) -> None:
-    choose(page, "filter", "mode", "randomised")
-    choose(page, "filter", "badge", "replayed")
+    choose(page, "filter", mode="randomised", badge="replayed")
     assert page.run(SHOWN).startswith("25 of 54 models")
-    choose(page, "filter", "text", "team 3")
+    choose(page, "filter", text="team 3")
     assert 0 < len(page.run(NAMES)) < 25
-    choose(page, "filter", "badge", "published")
+    choose(page, "filter", badge="published")
     assert page.run(SHOWN) == "no model matches"
     page.click("#filter button[type=reset]")
     page.wait(f"{SHOWN}.startsWith('54 of 54 models')")
@@ -150,23 +150,18 @@ def test_every_group_stands_for_itself_with_ranks_of_its_own(page: Page) -> None
 
 def test_views_show_levels_categories_and_tasks(page: Page) -> None:
     heads = "[...document.querySelectorAll('#board thead .num')].map(t => t.textContent)"
-    choose(page, "view", "show", "levels")
-    choose(page, "view", "of", "Pick_Blocks_Size")
+    choose(page, "view", show="levels", of="Pick_Blocks_Size")
     assert page.run(heads) == ["rank", "all", "L1", "L2", "L3", "L4", "L5", "size"]
-    choose(page, "view", "show", "categories")
-    choose(page, "view", "metric", "onta")
+    choose(page, "view", show="categories", metric="onta")
     assert page.run(heads) == ["GAC", "SDE", "CPI", "RRR", "CVR", "size"], "no ranks"
-    choose(page, "view", "show", "tasks")
-    choose(page, "view", "metric", "ps")
-    choose(page, "view", "of", "OFE")
-    choose(page, "view", "level", "5")
+    choose(page, "view", show="tasks", metric="ps", of="OFE", level="5")
     assert page.run(heads)[:2] == ["OFE", "Put Bottles Dustbin"], "progress is not tested"
 
 
 def test_ranks_are_for_cells_in_which_a_lie_would_have_shown(page: Page) -> None:
-    choose(page, "view", "show", "categories")
+    choose(page, "view", show="categories")
     for metric, name, rank in (("sr1", "GAC", True), ("sr1", "SDE", False), ("sr", "GAC", False)):
-        choose(page, "view", "metric", metric)
+        choose(page, "view", metric=metric)
         page.click(f"#board th[data-name={name}] button")
         ranks = {row[1]: row[0] for row in page.run(CELLS)}
         assert ranks.get("Partly", "")[:1].isdigit() == rank, (metric, name)
@@ -187,18 +182,16 @@ def test_a_model_of_one_task_shows_it_and_nothing_is_cut(page: Page, pair: Path)
 
 
 def test_two_models_side_by_side(page: Page) -> None:
-    choose(page, "pair", "one", "pi0-5")
-    choose(page, "pair", "two", "x-vla")
-    choose(page, "pair", "level", "5")
+    choose(page, "pair", one="pi0-5", two="x-vla", level="5")
     first = page.run("document.querySelector('#sides tbody tr').innerText")
     assert "22.3" in first.replace("22.2", "22.3") and "+2.3" in first.replace("+2.4", "+2.3")
     assert page.run("document.querySelectorAll('.charts svg').length") == 2
     rows = "document.querySelectorAll('#sides tbody tr').length"
     assert page.run(rows) == 13
-    choose(page, "pair", "tasks", "on")
+    choose(page, "pair", tasks="on")
     assert page.run(rows) == 69
     assert page.run("document.getElementById('unlike').hidden")
-    choose(page, "pair", "two", "model-1")
+    choose(page, "pair", two="model-1")
     text = page.run("document.getElementById('unlike').textContent")
     for word in ("suite (paper, robospa-1)", "scenes (clean, randomised)", "other seeds",
                  "other object meshes", "another renderer", "other sentences"):  # fmt: skip
@@ -218,9 +211,7 @@ FIRST = (
 def test_models_on_equal_seeds_are_paired(page: Page, pair: Path) -> None:
     """Fake 2 fails at one more seed of four: 25 points, five trials, in every direction."""
     page.open(pair)
-    choose(page, "pair", "tasks", "on")
-    choose(page, "pair", "one", "fake-1")
-    choose(page, "pair", "two", "fake-2")
+    choose(page, "pair", tasks="on", one="fake-1", two="fake-2")
     page.wait(f"{HOW}.startsWith('Paired')")
     one, two, gap, alone = page.run(FIRST)
     assert (one[0], two[0], gap[0], alone[0]) == ("75.0", "50.0", "+25.0", "5 : 0")
@@ -231,10 +222,9 @@ def test_models_on_equal_seeds_are_paired(page: Page, pair: Path) -> None:
         (100 * right.estimate.low, 100 * right.estimate.high), abs=0.06
     )
     assert float(alone[1].removeprefix("q = ")) == pytest.approx(right.q, rel=0.05)
-    choose(page, "pair", "one", "fake-2")
-    choose(page, "pair", "two", "fake-1")
+    choose(page, "pair", one="fake-2", two="fake-1")
     assert [cell[0] for cell in page.run(FIRST)] == ["50.0", "75.0", "-25.0", "0 : 5"]
-    choose(page, "pair", "two", "x-vla")
+    choose(page, "pair", two="x-vla")
     assert page.run(HOW).endswith("different groups.")
     assert len(page.run(FIRST)) == 3
     base = pair.parent.resolve().as_uri()
@@ -246,9 +236,7 @@ def test_a_pair_that_is_missing_is_said_to_be(page: Page, pair: Path) -> None:
     text = script.read_text()
     script.unlink()
     page.open(pair)
-    choose(page, "pair", "tasks", "on")
-    choose(page, "pair", "one", "fake-1")
-    choose(page, "pair", "two", "fake-2")
+    choose(page, "pair", tasks="on", one="fake-1", two="fake-2")
     page.wait(f"{HOW}.includes('could not be loaded')")
     assert page.run(FIRST)[2][0] == "+25.0"
     script.write_text(text)

@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def published(model: str) -> Series:
-    return Series(model, published_column(model).scores, published=True)
+RDT = Series("RDT", published_column("RDT").scores, published=True)
 
 
 LATE = {"p95": 6.0, "p99": 9.0, "max": 9.0}
@@ -66,12 +65,12 @@ def test_a_run_gets_all_figures_in_all_formats(drawn: Path) -> None:
 
 
 def test_published_models_have_no_latency_and_no_failures(tmp_path: Path) -> None:
-    made = [d.name for d in draw([published("RDT")], tmp_path, ())]
+    made = [d.name for d in draw([RDT], tmp_path, ())]
     assert made == ["success", "progress", "heat"]
 
 
 def test_beside_a_run_published_models_get_no_heat_map(tmp_path: Path) -> None:
-    made = [d.name for d in draw([small_run(), published("RDT")], tmp_path, ())]
+    made = [d.name for d in draw([small_run(), RDT], tmp_path, ())]
     assert [n for n in made if n.startswith("heat")] == ["heat-1"]
 
 
