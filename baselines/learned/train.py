@@ -53,7 +53,7 @@ class TrainOptions:
 
     blocks: Count = option(120, "lessons of so many scenes of each variant")
     pictures: Count = option(25, "so many pictures of each variant")
-    point: Count = option(21_000, "steps of what chooses the next step")
+    point: Count = option(30_000, "steps of what chooses the next step")
     find: Count = option(4_600, "steps of what finds objects in pictures")
     measure: Count = option(5_200, "steps of what measures them")
     seed: int = option(0, "seed of weights and batches")
