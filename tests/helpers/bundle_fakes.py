@@ -129,8 +129,9 @@ def make_run(
     keys: Sequence[TrialKey] = (),
     policy: FakePolicy | None = None,
     change: Callable[[dict[str, Any], dict[str, Any]], None] = lambda settings, about: None,
+    skip: int = 0,
 ) -> Path:
-    """A run of `keys` in the fake world."""
+    """A run of `keys` in the fake world, without its last `skip` trials."""
     keys, policy, world = list(keys) or all_keys(), policy or Weak(), World()
     settings: dict[str, Any] = {
         "embodiment": ("aloha-agilex",),
@@ -147,7 +148,7 @@ def make_run(
     settled, told = convert(settings, RunSettings), convert(about, RunAbout)
     write_manifest(folder, make_manifest(settled, keys, told, categories, SUITE))
     writer = RecordWriter(folder)
-    for key in keys:
+    for key in keys[: len(keys) - skip]:
         recorder = ActionRecorder()
         record = run_trial(
             world, policy, key, policy_seed=policy_seed(key, 0), recorder=recorder, parts=parts

@@ -91,15 +91,15 @@ def test_a_replay_with_other_final_states_has_a_badge_of_its_own(tmp_path: Path)
 
 def test_names_that_are_scripts_stay_text(tmp_path: Path) -> None:
     entry = published_entries()[0]
-    about = ((EVIL, EVIL),)
+    found, about = entry.column.results, ((EVIL, EVIL),)
+    setting = replace(found.setting, embodiment=(EVIL,))
     evil = replace(
         entry,
         name=EVIL,
         team=EVIL,
         about=about,
         evidence=about,
-        embodiment=EVIL,
-        column=Column(replace(entry.column.results, name=EVIL)),
+        column=Column(replace(found, name=EVIL, setting=setting)),
     )
     write_model(evil, tmp_path)
     for page in (index_page([evil]), (tmp_path / "index.html").read_text()):

@@ -171,7 +171,7 @@ def test_ranks_are_for_cells_in_which_a_lie_would_have_shown(page: Page) -> None
 def test_a_model_of_one_task_shows_it_and_nothing_is_cut(page: Page, pair: Path) -> None:
     page.open(pair)
     row = "document.querySelector('#board tbody tr:not(.group)').innerText"
-    assert "Pick Blocks Size SR@1 75.0, SR 75.0" in page.run(row)
+    assert "SR@1: Pick Blocks Size 75.0" in page.run(row)
     assert "rank" not in page.run("document.querySelector('#board thead').innerText")
     assert "not ranked: π0.5 (overall 34.6" in page.run(
         "document.getElementById('board').innerText"
