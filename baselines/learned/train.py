@@ -323,7 +323,8 @@ def card_of(out: Path, options: TrainOptions) -> dict[str, object]:
     return {
         "name": "learned",
         "suite": SUITE,
-        "learned_from": "drawn scenes and their plans: training seeds, split train, seen textures",
+        "learned_from": "drawn scenes and their plans: training seeds, seen textures, sentences of "
+        "the split train and paraphrases of them",
         "labels": "poses, sizes and kinds of the scenes' objects; steps of the expert's plans",
         "options": asdict(options),
         "pieces": "pieces.npz is cut from the weights of wordllama (MIT, see LICENSE-wordllama)",

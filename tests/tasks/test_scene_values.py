@@ -51,6 +51,15 @@ def test_facts_are_plain_in_the_scene_and_come_back(facts: Facts, plain: dict[st
     assert Facts.of(scene_with(facts)) == facts
 
 
+def test_numbers_of_numpy_are_numbers_of_a_scene() -> None:
+    one, other = (
+        replace(scene_with(Facts((), None)), objects=(SceneObject("a", "block", Pose((x, 0, 0))),))
+        for x in (np.float64(0.25), 0.25)
+    )
+    assert one.digest == other.digest and one.to_json() == other.to_json()
+    assert type(one.to_json()["objects"][0]["pose"]["position"][0]) is float
+
+
 def test_a_base_reads_its_own_fields_only() -> None:
     @dataclass(frozen=True)
     class Ordered(SceneFacts):
