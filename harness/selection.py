@@ -72,15 +72,15 @@ def parse_seeds(text: str | None, embodiment: str = REFERENCE, mode: str = "clea
     """
     if text is None:
         return partial(_accepted, embodiment=embodiment, mode=mode)
-    if not Path(text).exists():
-        if not re.fullmatch(r"[\d,\s-]+", text):
-            raise SettingsError(
-                f"seeds {text!r} is neither a file nor a list such as 100000-100099"
-            )
+    if re.fullmatch(r"[\d,\s-]+", text):
         numbers = parse_numbers(text, "seeds")
         return lambda task, level: numbers
     try:
         data = parse_json(Path(text).read_text())
+    except FileNotFoundError as error:
+        raise SettingsError(
+            f"seeds {text!r} is neither a file nor a list such as 100000-100099"
+        ) from error
     except (OSError, ValueError) as error:
         raise SettingsError(f"cannot read the seeds in {text}: {error}") from error
 

@@ -212,6 +212,8 @@ def test_levels_and_numbers_which_keep_their_order_and_lose_repetitions() -> Non
     assert parse_numbers("5,3-4,5", "seeds") == [5, 3, 4]
     with pytest.raises(SettingsError, match="is more than"):
         parse_numbers(str(10**23), "seeds")
+    many = [*range(100000, 100200, 2)]  # longer than a file's name may be
+    assert parse_seeds(",".join(map(str, many)))("A", 1) == many
 
 
 LEVELS = ("0", "6", "", "2-1", "1-", "-1", "a", "1,,2", "1-99999999")
