@@ -150,19 +150,16 @@ def paired_difference(only_first: int, only_second: int, trials: int) -> Estimat
 def paired_sample_difference(gaps: Sample) -> Estimate:
     """Mean of the differences of pairs: `gaps` has as many outcomes below 0 as above.
 
-    Tango's interval for success rates, the bootstrap for progress. Where no pair differs, the
-    interval is that of 0/1 outcomes, which vary the most.
+    Tango's interval for success rates, the bootstrap for progress. Where all pairs differ alike,
+    the interval is that of `_alike`, which of success rates is Tango's.
     """
     reach = (len(gaps.counts) - 1) // 2
     if gaps.shift != -reach * gaps.scale:
         raise ValueError("differences of pairs reach as far below zero as above")
     if reach > 1 and not gaps.constant:
         return _percentile(gaps.value, draw([gaps], [1.0]), "bootstrap")
-    if 0 < abs(gaps.total - reach * gaps.trials) < reach * gaps.trials and reach > 1:
-        found = paired_difference(0, 0, gaps.trials)  # all differ by the same part of a whole
-        return replace(
-            rescaled(found, reach * gaps.scale, gaps.value), method="Tango, as for equals"
-        )
+    if reach > 1:
+        return replace(_alike(gaps, METHODS[0]), method="Tango, as for equals")
     found = paired_difference(gaps.counts[-1], gaps.counts[0], gaps.trials)
     return rescaled(found, reach * gaps.scale, 0.0)
 
@@ -226,16 +223,21 @@ _RATES: dict[str, Callable[[int, int], Estimate]] = {"wilson": wilson, "exact": 
 
 
 def _cell(sample: Sample, method: str, seed: int) -> Estimate:
-    """One variant. Progress that never varies is bounded by the rate of any progress at all."""
+    """One variant. Progress that never varies is bounded by how often it may be another."""
     if sample.binary:
         return rescaled(_RATES[method](sample.total, sample.trials), sample.scale, sample.shift)
-    n = sample.trials
-    if sample.counts[0] == n or sample.counts[-1] == n:
-        bound = _RATES[method](n if sample.counts[-1] else 0, n)
-        top = len(sample.counts) - 1
-        name = f"bootstrap, {bound.method} where all are equal"
-        return replace(rescaled(bound, sample.scale * top, sample.shift), method=name)
+    if sample.constant:
+        return _alike(sample, method)
     return _percentile(sample.value, draw([sample], [1.0], seed), "bootstrap")
+
+
+def _alike(sample: Sample, method: str) -> Estimate:
+    """Trials of one outcome: others are no more frequent than what so many may never show, and at
+    worst the least or the most that there is."""
+    others, value = _RATES[method](0, sample.trials), sample.value
+    least, most = (sample.shift + sample.scale * c for c in (0, len(sample.counts) - 1))
+    ends = value - others.high * (value - least), value + others.high * (most - value)
+    return Estimate(value, *ends, f"bootstrap, {others.method} where all are equal")
 
 
 def rescaled(estimate: Estimate, scale: float, shift: float) -> Estimate:

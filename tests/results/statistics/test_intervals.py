@@ -123,6 +123,9 @@ def test_pairs_of_progress() -> None:
     assert equal.high == pytest.approx(paired_difference(0, 0, 100).high)
     shifted = paired_sample_difference(Sample((0, 0, 0, 100, 0), 0.5, -1.0))
     assert shifted.low < shifted.value == 0.5 < shifted.high
+    assert paired_sample_difference(Sample((0, 0, 0, 1, 0), 0.5, -1.0)).high < 1
+    whole = paired_sample_difference(Sample((0, 0, 0, 0, 10), 0.5, -1.0))
+    assert whole.low == pytest.approx(paired_difference(10, 0, 10).low)
 
 
 def test_every_method_says_what_it_did() -> None:
@@ -151,12 +154,14 @@ def test_onta_of_several_candidate_counts_is_a_weighted_sum() -> None:
 
 
 @pytest.mark.parametrize("method", METHODS[:2])
-@pytest.mark.parametrize("counts", [(100, 0, 0), (0, 0, 100)])
+@pytest.mark.parametrize("counts", [(100, 0, 0), (0, 0, 100), (0, 100, 0), (0, 1, 0)])
 def test_progress_that_never_varies_keeps_a_width(method: str, counts: tuple[int, ...]) -> None:
     found = interval_of([Sample(counts, 0.5)], method=method)
     assert found.high - found.low > 0.02
-    assert found.value in (found.low, found.high)
+    assert 0 <= found.low <= found.value <= found.high <= 1
+    assert (found.value in (found.low, found.high)) == (not counts[1])
     assert "where all are equal" in found.method
+    assert p_of_difference(Sample(counts, 0.5), Sample((0, 0, 0, 1, 0), 0.25)) > 0
 
 
 def test_over_tasks_is_never_narrower_than_over_seeds() -> None:
