@@ -17,8 +17,9 @@ has these names, or others in `NAMES`, the first of which wins:
 Names of the space that was not asked for are ignored, as by RoboTwin's client of it; any other name
 is refused, because what it holds would be lost. An arm or a gripper that an action does not name
 stays as it was commanded last. Every message has
-an id, which its answer must repeat. Failures and unknown types are answered, a message that cannot
-be decoded is not: then the deadline is the only news.
+an id, which its answer must repeat, and which no other message ever had: since August 2026 the
+server answers a known id as before, without asking the model. Failures and unknown types are
+answered, a message that cannot be decoded is not: then the deadline is the only news.
 """
 
 import contextlib
@@ -26,6 +27,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from typing import Annotated
+from uuid import uuid4
 
 import numpy as np
 from msgspec import Meta
@@ -243,6 +245,7 @@ class XPolicyLabSession(StatelessSession):
         self._trial: dict[str, object] = {}
         self._joints = SIX_JOINT_ARMS
         self._ids: dict[str, object] = {}
+        self._unique = uuid4().hex
         spec = options.spec_of("xpolicylab")
         self._socket = MsgpackSocket(params, binary_form)
         greeting = self._call(0, "hello", "hello_ack", {}, params.timeouts.hello)
@@ -284,7 +287,7 @@ class XPolicyLabSession(StatelessSession):
         self, id: int, kind: str, expected: str, payload: object, timeout: float, step: int = 0
     ) -> Mapping[str, object]:
         """The payload of the answer of type `expected` to this message."""
-        name = f"{id}-{kind}"
+        name = f"{self._unique}-{id}-{kind}"
         message = {
             "message_type": kind,
             "message_id": name,

@@ -214,6 +214,16 @@ def test_xpolicylab_is_sent_what_its_server_reads() -> None:
         assert np.array_equal(seen["vision"][theirs]["color"], image(ours))
 
 
+def test_xpolicylab_no_two_connections_share_an_id() -> None:
+    server = XPolicyLab(lambda seen: steps(joint_chunk()))
+    with server as url:
+        for _ in range(2):  # such as `check` and a run: newer servers answer a known id as before
+            with connect(url, timeouts=QUICK) as policy:
+                policy.reset(TRIAL)
+                policy.infer(observation())
+    assert len({request["message_id"] for request in server.requests}) == 8
+
+
 def test_xpolicylab_state_is_split_by_arm() -> None:
     server = XPolicyLab(lambda seen: steps(joint_chunk()))
     with talking(server) as policy:
