@@ -81,13 +81,15 @@ class ModelPolicy:
     ) -> list[Chunk]:
         """One chunk per observation. The noise of each follows from its trial's policy seed and
         its step alone, so neither neighbours in the batch nor a repeated call change it."""
-        queries = []
-        for observation, session in zip(observations, sessions, strict=True):
-            trial, memory = self._trials[session]
+        queries, kept = [], [self._trials[session] for session in sessions]
+        for observation, (trial, memory) in zip(observations, kept, strict=True):
             source = np.random.SeedSequence([trial.policy_seed, int(observation["step"])])
             seed = int(source.generate_state(1, np.uint64)[0]) >> 1  # 0 to 2^63 - 1
-            queries.append(Query(observation, trial, seed, memory))
-        return self.predict(queries)
+            queries.append(Query(observation, trial, seed, dict(memory)))
+        chunks = self.predict(queries)
+        for query, (_, memory) in zip(queries, kept, strict=True):
+            memory.update(query.memory)  # not before all are answered: else each is asked again
+        return chunks
 
 
 def import_code(module: str, code: str | None, whose: str) -> Any:

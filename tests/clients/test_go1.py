@@ -350,6 +350,25 @@ def test_memory_belongs_to_a_trial_of_a_session() -> None:
     assert ask(1) == 1
 
 
+class Failing(Counting):
+    """Cannot answer several at once, which shows when it has answered some of them."""
+
+    def predict(self, asks: Any) -> list[Any]:
+        answers = super().predict(asks)
+        if len(asks) > 1:
+            raise ValueError("one of them cannot be answered")
+        return answers
+
+
+def test_a_call_that_fails_for_one_is_forgotten_by_the_others() -> None:
+    policy, observation = Failing(), seen(Counting.spec)
+    for session in (1, 2):
+        policy.reset_session(session, trial())
+    with pytest.raises(ValueError):
+        policy.infer_batch([observation] * 2, [1, 2])
+    assert policy.infer_batch([observation], [1])[0][0, 0] == 1
+
+
 def test_code_that_is_missing_is_named() -> None:
     with pytest.raises(ModelMissing, match=r"cannot import no_such_model .* with a checkout of X"):
         import_code("no_such_model", None, "a checkout of X")
