@@ -29,7 +29,8 @@ from robospa.protocol.transport import Transport
 
 NPY = re.compile(
     rb"\x93NUMPY(?:\x01\x00..|\x02\x00....)"
-    rb"\{'descr': '([^']*)', 'fortran_order': (True|False), 'shape': \(([0-9, ]*)\), \} *\n",
+    rb"\{'descr': '([^']*)', 'fortran_order': (True|False), "
+    rb"'shape': \(((?:\d{1,18}(?:, ?|(?=\))))*)\), \} *\n",
     re.DOTALL,
 )
 """How numpy begins a .npy file of plain numbers; its own reader takes Python's parser for this."""

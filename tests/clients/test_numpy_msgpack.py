@@ -13,6 +13,9 @@ from robospa.protocol.codec import DEFAULT_LIMITS, encode
 from robospa.protocol.errors import DecodeError
 
 
+NPY = b"\x93NUMPY\x01\x00vv{'descr': '<f4', 'fortran_order': False, 'shape': (%b), }\n"
+
+
 @settings(deadline=None, max_examples=100)
 @given(st.binary(max_size=200))
 def test_noise_raises_nothing_else(data: bytes) -> None:
@@ -34,6 +37,10 @@ def test_arrays_come_back(form: Any) -> None:
         (b"\xdf\x00\x01\x86\x9f" * 1000, "99999 members announced"),
         (msgpack.packb({b"nd": True, b"type": "<f4", b"kind": b"V"}), "objects or structures"),
         (b"\x81\x90\xc0", "key"),
+        *(
+            (msgpack.packb({"__ndarray_class__": True, "as_npy": NPY % sizes}), "no .npy file")
+            for sizes in (b"1 2,", b",", b"9" * 5000 + b",")
+        ),
     ],
 )
 def test_what_is_refused(data: bytes, told: str) -> None:
