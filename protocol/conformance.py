@@ -361,7 +361,10 @@ def _episode(policy: RemotePolicy, spec: PolicySpec, number: int) -> PolicyAnswe
     seen = [synthetic_observation(spec, step, seed=10 * number + step) for step in range(3)]
     answers = [policy.infer(one) for one in seen]
     calls = [call for answer in answers if isinstance(answer, list) for call in answer]
-    return calls or np.concatenate([one for one in answers if isinstance(one, np.ndarray)])
+    chunks = [one for one in answers if isinstance(one, np.ndarray)]
+    widths = sorted({chunk.shape[1] for chunk in chunks})
+    assert len(widths) < 2, f"actions of {' and '.join(map(str, widths))} numbers in one trial"
+    return calls or np.concatenate(chunks)
 
 
 def _real_time_chunking(target: _Target) -> str:

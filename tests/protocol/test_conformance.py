@@ -55,6 +55,15 @@ def test_a_bad_chunk_fails_the_check_of_actions(start: Any, bad: Any) -> None:
     assert verdicts(server.url)["actions"] is False
 
 
+def test_actions_of_changing_width_fail_and_end_nothing(start: Any) -> None:
+    class Wider(Recall):
+        def infer(self, observation: Any) -> Any:
+            return np.zeros((2, 14 + observation["step"] % 2), "f4")
+
+    server = start(policy_factory=lambda: Wider(replace(SPEC, action_dim=None)))
+    assert verdicts(server.url)["concurrent sessions"] is False
+
+
 def test_a_broken_promise_of_repeatability(start: Any) -> None:
     class Moody(Recall):
         count = itertools.count()
