@@ -110,12 +110,18 @@ def _named_port(host: str, port: int) -> Iterator[None]:
 
 
 def _tls(certificate: Path | None, key: Path | None) -> SSLContext | None:
-    if certificate is None:
-        return None
     import ssl
 
+    if certificate is None and key is not None:
+        raise BadOptions("--key is that of a --certificate: without one nothing is encrypted")
+    if certificate is None:
+        return None
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-    context.load_cert_chain(certificate, key)
+    try:
+        context.load_cert_chain(certificate, key)
+    except OSError as error:
+        files = f"--certificate {certificate}" + (f" and --key {key}" if key else "")
+        raise BadOptions(f"{files} cannot be used: {error.strerror or error}") from error
     return context
 
 

@@ -12,7 +12,6 @@ from robospa.clients.numpy_msgpack import binary_form, text_form, unpack
 from robospa.protocol.codec import DEFAULT_LIMITS, encode
 from robospa.protocol.errors import DecodeError
 
-
 NPY = b"\x93NUMPY\x01\x00vv{'descr': '<f4', 'fortran_order': False, 'shape': (%b), }\n"
 
 

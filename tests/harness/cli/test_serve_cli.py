@@ -124,6 +124,8 @@ def test_a_plain_function_makes_one_policy_per_connection(served: dict[str, Any]
         (["create", "--option", "path"], "not NAME=VALUE"),
         (["create", "--option", "path=a", "--option", "path=b"], "given twice"),
         (["untyped", "--option", "rows=1"], "unexpected keyword argument 'rows'"),
+        (["untyped", "--key", "mine.pem"], "nothing is encrypted"),
+        (["untyped", "--certificate", "/none.pem"], "/none.pem cannot be used: No such file"),
     ],
 )
 def test_options_that_cannot_be_are_named(words: list[str], says: str) -> None:
