@@ -219,7 +219,8 @@ def axes(text: str) -> list[tuple[str, float]]:
     or "all", which leaves out what needs a real clock. ValueError for what is none of these."""
     found: list[tuple[str, float]] = []
     for word in (w.strip() for w in text.split(",")):
-        group = [v for v in VARIATIONS.values() if word in ("all", v.of) and v.name != "latency"]
+        members = [v for v in VARIATIONS.values() if v.name != "latency"]
+        group = [v for v in members if word in ("all", v.of or "all")]
         group = [VARIATIONS[word]] if word in VARIATIONS else group
         found += [(v.name, strength) for v in group for strength in v.profile or (v.usual,)]
         found += [] if group else [_part(word, text)]
