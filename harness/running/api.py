@@ -68,7 +68,9 @@ def evaluate(
     going = goes_on(resume, asked.out)
     if policy is None or isinstance(policy, str | Sequence):
         if policy is not None:
-            asked = updated(asked, {"policy": policy, "policy_map": None})
+            asked = updated(asked, {"policy": policy, "policy_map": settings.get("policy_map")})
+        elif settings.get("policy_map") is not None:
+            asked = replace(asked, policy=())
         request = make_request(asked, token=token, resume=going)
         run_request(request)
         return load_run(request.config.folder)

@@ -50,6 +50,13 @@ def test_several_servers(tmp_path: Path) -> None:
     assert run.manifest.about.arguments["policy"] == [a.url, b.url]
 
 
+def test_a_map_of_policies_in_place_of_those_of_a_file(tmp_path: Path) -> None:
+    (tmp_path / "map.json").write_text('{"Pick_Blocks_Size": "run_fakes:FakePolicy"}')
+    (tmp_path / "run.toml").write_text('policy = ["ws://nobody:1"]')
+    places = {"config": tmp_path / "run.toml", "policy_map": tmp_path / "map.json"}
+    check(robospa.evaluate(out=tmp_path / "run", workers=1, **places, **RUN), tmp_path / "run")
+
+
 @pytest.mark.parametrize("policy", [FakePolicy, lambda: FakePolicy(), Batched()])
 def test_what_serves_several_workers(policy: Any, tmp_path: Path) -> None:
     check(robospa.evaluate(policy, workers=2, out=tmp_path, **RUN), tmp_path)
@@ -90,6 +97,7 @@ def test_a_module_and_class_and_its_settings_again(tmp_path: Path) -> None:
         ("hold", {"trails": 3}, "no setting 'trails'; did you mean trials"),
         ("hold", {"video": "some"}, "not one of none, failures, first, all"),
         (None, {}, "or else --policy-map"),
+        ("hold", {"policy_map": "map.json"}, "or else --policy-map"),
     ],
 )
 def test_what_cannot_be_is_refused_before_anything_is_written(
