@@ -226,8 +226,9 @@ def films_of(config: WorkerConfig, known: Mapping[TrialKey, TrialRecord], worker
     """The films of a run: those that its `known` trials lack, unless it wants none now."""
     films = Films(config, workers)
     if config.video != "none":
+        there = films_in(config.folder)
         wanted = [r for r in known.values() if r.video == film_name(r.key)]
-        films.add(wanted, films_in(config.folder))
+        films.add(sorted(wanted, key=lambda r: r.video not in there), there)
     return films
 
 
