@@ -90,6 +90,11 @@ def invert_grippers(chunk: object, space: ActionSpace) -> Any:
     return actions
 
 
+def executed_before(observation: Observation) -> int:
+    """Actions of the trial that were executed; in real time a robot that holds executes none."""
+    return int(observation.get("executed", observation["step"]))
+
+
 def last_executed(chunk: NDArray[T] | None, done: int) -> NDArray[T] | None:
     """The action (D,) of a chunk (T, D) after which `done` actions were executed; None of none."""
     return None if chunk is None or done <= 0 else chunk[min(done, len(chunk)) - 1]
@@ -117,7 +122,7 @@ class Targets:
         by the check that follows."""
         if self._of == "none" or not isinstance(chunk, np.ndarray) or chunk.ndim != 2:
             return chunk
-        step = int(observation["step"])
+        step = executed_before(observation)
         if self._start is None:
             self._start = np.asarray(observation["state"], np.float64)
         if chunk.shape[1] != len(self._start):

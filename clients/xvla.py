@@ -26,6 +26,7 @@ from robospa.clients.chunks import (
     ChunkOptions,
     Count,
     camera_names,
+    executed_before,
     invert_grippers,
     last_executed,
     refuse_unread,
@@ -149,7 +150,7 @@ class XvlaSession(HttpSession):
             )
         refuse_unread(answer, ("action",))
         self._chunk = self._actions(chunk_of(answer["action"]))
-        self._asked_at = int(observation["step"])
+        self._asked_at = executed_before(observation)
         return self._chunk, {}
 
     def _actions(self, chunk: object) -> NDArray[np.float32]:
@@ -182,7 +183,7 @@ class XvlaSession(HttpSession):
         """The robot's state as the model reads it."""
         last = None
         if self._options.proprio == "commanded":
-            last = last_executed(self._chunk, int(observation["step"]) - self._asked_at)
+            last = last_executed(self._chunk, executed_before(observation) - self._asked_at)
         if self._options.space == "joint":
             state = np.array(observation["state"] if last is None else last, dtype=float)
             closed = self._options.joint_grippers == "closed"

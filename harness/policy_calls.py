@@ -95,19 +95,29 @@ class PolicyCaller:
     """For every answer, the times that the policy's server reported [ms]."""
 
     def next_actions(
-        self, run: TrialState, spec: PolicySpec, committed: Committed | None = None
+        self,
+        run: TrialState,
+        spec: PolicySpec,
+        committed: Committed | None = None,
+        executed: int | None = None,
     ) -> NDArray[np.float32]:
         """The policy's next actions, float32 (T, D), quantised as they are executed; `committed`
-        is sent along with the observation."""
-        return run.checked(self.next_answer(run, spec, committed), spec)
+        and `executed` go with the observation."""
+        return run.checked(self.next_answer(run, spec, committed, executed), spec)
 
     def next_answer(
-        self, run: TrialState, spec: PolicySpec, committed: Committed | None = None
+        self,
+        run: TrialState,
+        spec: PolicySpec,
+        committed: Committed | None = None,
+        executed: int | None = None,
     ) -> object:
         """The same as the policy answers it."""
         observation = run.observation(spec)
         if committed is not None:
             observation["committed"], observation["delay"] = committed.actions, committed.delay
+        if executed is not None:
+            observation["executed"] = executed
         try:
             answer = run.stopwatch.ask(self.policy, self.policy.infer, observation)
         finally:

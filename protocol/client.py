@@ -346,7 +346,8 @@ class _RobospaClient:
     def infer(
         self, id: int, observation: Observation, timeout: float
     ) -> tuple[object, Mapping[str, float]]:
-        request = messages.Infer(id, observation)
+        sent = {name: value for name, value in observation.items() if name != "executed"}
+        request = messages.Infer(id, sent)
         if self.spec.action in CALLED:
             said = self._call(request, messages.Calls, timeout)
             return said.calls, said.timing

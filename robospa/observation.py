@@ -60,6 +60,9 @@ class Observation(View, total=False):
     """The sentence of the trial."""
     step: int
     """Number of actions executed so far in this trial; in real time, of periods of one."""
+    executed: int
+    """In real time: the same without the periods in which the robot held. For clients that keep the
+    last command; `robospa.v1` does not send it."""
     history: dict[int, View]
     """Earlier views by their offset in executed actions (negative), for `PolicySpec.history`."""
     privileged: Mapping[str, Any]

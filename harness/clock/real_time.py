@@ -160,7 +160,8 @@ class RealTime:
         self._arrive(period)
         if self._thinking is None and self.remaining.wants_query:
             query, start = len(self.log.asked), self.remaining.executed
-            actions = self.answers.next_actions(self.run, self.spec, self._committed())
+            committed = self._committed()
+            actions = self.answers.next_actions(self.run, self.spec, committed, start)
             latency = next(self._latencies)
             self.log.ask(period, latency)
             due = period + self.clock.delay(latency)

@@ -423,6 +423,15 @@ def test_changes_of_joints_are_added_up_over_a_trial(of: str) -> None:
     assert "state" not in server.requests[0]["examples"][0]
 
 
+def test_a_period_in_which_the_robot_held_is_no_executed_action() -> None:
+    server = preset("starvla", STARVLA, *[{"data": {"actions": np.full((1, 9, 14), 0.25)}}] * 2)
+    with talking(server, "?deltas=last&execute=2") as policy:
+        policy.infer(observation(executed=0))
+        chunk = policy.infer(observation(step=5, executed=2))
+    assert np.allclose(chunk[0], STATE + 0.75, atol=1e-6)
+    assert server.requests[0].keys() == server.requests[1].keys() - {"executed"}
+
+
 def test_an_idle_connection_is_made_anew_to_the_same_server_alone() -> None:
     metadata = {"image_resolution": [1, 1], "ckpt": "1"}
     server = preset("vllm", metadata, *[np.ones((1, 14), np.float32)] * 2)

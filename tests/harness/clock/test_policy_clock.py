@@ -293,6 +293,7 @@ def test_the_policy_sees_the_instant_at_which_it_is_asked() -> None:
     play(policy, real("120ms", "arrival"))
     assert [seen["step"] for seen in policy.seen] == [0, 3, 5, 7, 9, 11]
     assert [seen["state"][0] for seen in policy.seen] == [0.0, 0.5, 1.5, 2.5, 3.5, 4.5]
+    assert [seen["executed"] for seen in policy.seen] == [0, 1, 3, 5, 7, 9]
 
 
 def test_the_time_that_a_step_limit_takes_is_the_time_limit() -> None:
