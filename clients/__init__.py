@@ -49,6 +49,8 @@ def find_endpoint(url: str, options: Mapping[str, object] | None = None) -> Endp
     dialect = by_scheme.get(parts.scheme)
     if parts.scheme in REFUSED:
         raise ValueError(f"{shown!r}: {REFUSED[parts.scheme]}")
+    if "://" not in url:
+        raise ValueError(f"{shown!r} is no URL: of a server of robospa serve write ws://{shown}")
     if dialect is None:
         raise ValueError(f"{shown!r} is no address of a policy server; {_addresses(by_scheme)}")
     if not parts.hostname:

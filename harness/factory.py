@@ -18,6 +18,9 @@ def policy_factory(name: str) -> Callable[..., Policy]:
     """The function that makes a policy, by entry-point name or `module:function`."""
     if re.fullmatch(r"[\w.-]+:\d+(/.*)?", name):
         raise UnknownName(f"{name!r} is no module:function; of a server write ws://{name}")
+    if file := re.match(r"(.*/)?(\w+)\.py\b", name):
+        module = f"{file[2]}:{name.partition(':')[2] or 'MyPolicy'}"
+        raise UnknownName(f"{name!r} is a file: write {module}, in its folder or with PYTHONPATH")
     if ":" in name:
         if os.getcwd() not in sys.path:
             sys.path.append(os.getcwd())  # so that a policy's own folder is enough to serve it
@@ -47,5 +50,12 @@ def open_policy(target: str, options: Mapping[str, Any]) -> Policy:
         from robospa.clients import connect
 
         return connect(target, **options)
-    policy: Policy = policy_factory(target)()
+    from robospa.protocol.policy_host import spec_of
+
+    make = policy_factory(target)
+    try:
+        policy: Policy = make()
+    except TypeError as error:
+        raise UnknownName(f"{target} cannot be made: {error}") from error
+    spec_of(policy)
     return policy

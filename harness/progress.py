@@ -222,7 +222,7 @@ class Progress(Bar):
         if self.lost:
             parts.append(f"{self.lost} lost")
         if status is not None and status.films:
-            parts.append(f"{status.films} films to make")
+            parts.append(f"{status.films} film{'s' * (status.films != 1)} to make")
         return ", ".join(parts)
 
     def _picture(self) -> RenderableType:

@@ -147,14 +147,17 @@ class PolicySession:
 
 
 def spec_of(policy: Policy) -> PolicySpec:
-    """What `policy` reads and answers; ValueError, saying what to write, if it does not say."""
-    found = getattr(policy, "spec", None)
+    """What `policy` reads and answers; ValueError, saying what to write, if it does not say or
+    lacks a method."""
+    found, name = getattr(policy, "spec", None), type(policy).__name__
     if not isinstance(found, PolicySpec):
-        name = type(policy).__name__
         raise ValueError(
             f"{name}.spec is no PolicySpec but {type(found).__name__}: a policy says what it reads "
             f'and answers, at least spec = robospa.PolicySpec("{name}")'
         )
+    for method in () if has(policy, "infer_batch") else ("reset(trial)", "infer(observation)"):
+        if not callable(getattr(policy, method.partition("(")[0], None)):
+            raise ValueError(f"{name} has no method {method}, which every policy needs")
     return found
 
 

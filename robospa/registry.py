@@ -42,11 +42,14 @@ def load(path: str) -> Any:
     module, _, name = path.partition(":")
     try:
         return getattr(importlib.import_module(module), name)
-    except (ImportError, AttributeError, ValueError) as error:
+    except Exception as error:  # whatever a module does while it is imported
         package = str(getattr(error, "name", "")).partition(".")[0]
         if path.startswith("robospa.") and package in EXTRAS:
             raise UnknownName(f"{package} is not installed; {remedy(package)}") from error
-        raise UnknownName(f"cannot load {path!r}: {error}") from error
+        kind = (
+            "" if isinstance(error, ImportError | AttributeError) else f"{type(error).__name__}: "
+        )
+        raise UnknownName(f"cannot load {path!r}: {kind}{error}") from error
 
 
 def names(group: str) -> tuple[str, ...]:

@@ -185,7 +185,7 @@ def _milliseconds(text: str) -> list[float]:
         found = []
     if len(found) < 2 or found != sorted(set(found)) or found[0] < 0:
         raise SettingsError(
-            f"latencies {text!r} are no growing milliseconds, two or more, such as 0,100,200"
+            f"latencies {text!r} are not two or more growing numbers [ms], such as 0,100,200"
         )
     return found
 

@@ -126,13 +126,16 @@ def misused(error: Exception) -> str:
     """What is wrong with the words of a command line, and where its help is; "" for others."""
     text = getattr(error, "format_message", str)()
     context = getattr(error, "ctx", None)
-    where = "" if context is None else f"; see {context.command_path} --help"
+    where = "" if context is None else f" (see {context.command_path} --help)"
+    text = text.replace("Value error, ", "")
     return text and text[0].lower() + " ".join(text[1:].split()).rstrip(".") + where
 
 
 def sentence(error: BaseException) -> str:
     """`error` in one line; its class only where the text was not written for users."""
     words = error.args[0] if isinstance(error, KeyError) and error.args else error
+    if isinstance(error, OSError) and error.filename and error.strerror:
+        words = f"{error.filename}: {error.strerror}"
     from robospa.extras import remedy
     from robospa.protocol.errors import without_secrets
 

@@ -88,7 +88,7 @@ def report(
         _audit(_one(run), reproduction, policy, samples, token, as_json)
     elif safety:
         _safety(_one(run), as_json)
-    elif failures:
+    elif failures or trials:
         _failures(_one(run), by, trials, film, as_json)
     else:
         if film:

@@ -154,7 +154,8 @@ def _hosted(
         try:
             factory()  # one that fails should do so before anybody connects
         except TypeError as error:
-            raise BadOptions(f"{policy} cannot be made: {error}") from error
+            hint = f"see robospa serve {policy} --show-options"
+            raise BadOptions(f"{policy} cannot be made: {error} ({hint})") from error
         return {
             "policy_factory": factory,
             "options": ServerOptions(max_connections=connections),

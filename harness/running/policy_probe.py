@@ -70,7 +70,8 @@ def read_map(file: Path, tasks: Sequence[str], known: Collection[str]) -> dict[s
     try:
         found = parse_json(file.read_text())
     except (OSError, ValueError) as error:
-        raise RunError(f"--policy-map {file} cannot be read: {error}") from error
+        why = getattr(error, "strerror", None) or error
+        raise RunError(f"--policy-map {file} cannot be read: {why}") from error
     if not isinstance(found, dict) or not all(map(_is_targets, found.values())):
         raise RunError(
             f"--policy-map {file} is no map from tasks to URLs: write "

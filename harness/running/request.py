@@ -25,6 +25,7 @@ from robospa.harness.settings import (
     flat,
 )
 from robospa.harness.worlds import SAPIEN_NAME, WorldKind, world_kind
+from robospa.protocol.errors import printable
 from robospa.registry import UnknownName
 from robospa.results.records.manifest import MANIFEST
 from robospa.trial import TrialKey
@@ -114,7 +115,9 @@ def check_servers(settings: EvaluationSettings) -> tuple[str, ...]:
     Raises SettingsError unless there is either one policy or a map of policies.
     """
     servers = settings.policy
-    if bool(servers) == (settings.policy_map is not None):
+    if servers and settings.policy_map is not None:
+        raise SettingsError("give the policy or --policy-map FILE, not both")
+    if not servers and settings.policy_map is None:
         raise SettingsError(
             "give the policy, a URL or a name, or else --policy-map FILE (see --help-all)"
         )
@@ -179,7 +182,8 @@ def client_options(url: str, file: Path | None) -> dict[str, Any]:
         check_options(url, given)
     except (OSError, ValueError) as error:
         where = f"--client {file}: " if file is not None else ""
-        raise SettingsError(f"{where}{str(error)[:300]}") from error
+        text = printable(str(getattr(error, "strerror", None) or error), 600)
+        raise SettingsError(f"{where}{text}") from error
     return given
 
 

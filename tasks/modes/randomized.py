@@ -279,8 +279,7 @@ def _part(text: str, parts: str) -> tuple[str, float]:
     if found is None:
         hint = did_you_mean(name, tuple(VARIATIONS))
         raise ValueError(
-            f"no part {name!r} of a randomised scene in {parts!r}; {hint}there are "
-            f"{', '.join(VARIATIONS)}"
+            f"no part or axis {name!r} in {parts!r}; {hint}there are {', '.join(VARIATIONS)}"
         )
     if not equals:
         return name, found.usual

@@ -35,11 +35,19 @@ REFUSED = [
     ("official assets", "`robospa official assets DIR --add`"),
     ("check ws://127.0.0.1:9 --demo no.hdf5", "cannot be read as an HDF5 demonstration"),
     ("eval localhost:8000 --out run", "of a server write ws://localhost:8000"),
-    ("eval http://localhost:8000 --out run", "no address of a policy server"),
+    ("eval http://localhost:8000 --out run", "(ws:// for one of robospa serve)\n"),
+    ("eval mine.py:Mine --out run", "is a file: write mine:Mine, in its folder"),
+    ("eval ./mine.py --out run", "is a file: write mine:MyPolicy, in its folder"),
+    ("eval ws://127.0.0.1:9 --client no.toml --out run", "--client no.toml: No such file"),
+    ("eval hold --policy-map no.json --out run", "give the policy or --policy-map FILE, not both"),
+    ("eval --policy-map no.json --out run", "no.json cannot be read: No such file"),
+    ("serve hold --options no.json", "robospa: no.json: No such file"),
+    ("serve hold --option size=1", "(see robospa serve hold --show-options)"),
+    ("report a --trials", "a is not a run: it has no run.json"),
     ("eval hold --latency 0,100", "--out"),
 ]
 REFUSED += [
-    (f"eval hold --out run --latency={given}", "no growing milliseconds")
+    (f"eval hold --out run --latency={given}", "two or more growing numbers")
     for given in ("0", "200,100", "0,x", "-5,10", "0,0")
 ]
 REFUSED += [
@@ -62,6 +70,8 @@ REFUSED += [
     ]
 ]
 MISTYPED = [
+    ("check localhost:8000", "of a server of robospa serve write ws://localhost:8000"),
+    ("compare a b --metric best", "'--metric': 'best' is not one of"),
     ("submit .", "--model"),
     ("check ws://127.0.0.1:9 --timeout -5", "-5 is not from 0.001 to 604800"),
     ("tasks Pick_Block_Size", "did you mean Pick_Blocks_Size"),
@@ -94,6 +104,37 @@ def test_every_refusal_is_one_sentence_and_writes_nothing(
     assert (done.code, done.out) == (code, "") and said in done.err
     assert done.err.count("\n") == 1
     assert {path.name for path in tmp_path.iterdir()} == {"no.zip", "no.hdf5"}
+
+
+WRONG_MODULES = [
+    ("class Mine", "SyntaxError: expected ':'"),
+    ("from . import weights", "attempted relative import"),
+    ("{}['weights']", "KeyError: 'weights'"),
+    ("import robospa", "has no attribute 'Mine'"),
+    ("class Mine:\n    def __init__(self, weights): ...", "missing 1 required positional argument"),
+    ("class Mine: ...", "Mine.spec is no PolicySpec but NoneType"),
+    (
+        "import robospa\nclass Mine:\n    spec = robospa.PolicySpec('mine')\n"
+        "    def reset(self, trial): ...",
+        "Mine has no method infer(observation), which every policy needs",
+    ),
+]
+
+
+@pytest.mark.parametrize("number", range(len(WRONG_MODULES)))
+def test_a_policy_that_cannot_be_made_is_refused_by_both_commands(
+    number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text, said = WRONG_MODULES[number]
+    (tmp_path / f"wrong_module_{number}.py").write_text(text)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    name = f"wrong_module_{number}:Mine"
+    words = eval_words("run", name)
+    for done in (robospa(*words), robospa("serve", name, "--port", "0")):
+        assert (done.code, done.out) == (1, "") and said in done.err
+        assert done.err.count("\n") == 1
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_forgotten_token(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -50,7 +50,7 @@ def test_every_choice_of_parts_has_one_name(name: str, spelling: str) -> None:
     ("name", "sentence"),
     [
         ("clean:light", "scene mode 'clean' has no parts to choose"),
-        ("randomized:", "no part ''"),
+        ("randomized:", "no part or axis ''"),
         ("randomized:lihgt", "did you mean light\\? there are height, texture, light"),
         ("randomized:light,light", "name a part twice"),
         ("randomized:clutter=2.5", "must be a whole number above 0 and at most 20, not '2.5'"),
