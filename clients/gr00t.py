@@ -21,7 +21,7 @@ import json
 import socket
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -60,7 +60,7 @@ class ZeroMq:
         except ImportError as error:
             raise errors.HandshakeError(MISSING) from error
         self.url, self._limits, self._token = params.endpoint.url, params.limits, params.token
-        connect_until(self.url, params.timeouts.wait, lambda: _greeted(params))
+        host = connect_until(self.url, params.timeouts.wait, lambda: _greeted(params))
         keep_freed_memory()
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._socket = self._context.socket(zmq.REQ)
@@ -70,7 +70,8 @@ class ZeroMq:
         self._poller = zmq.Poller()
         for end in (self._socket, self._monitor):
             self._poller.register(end, zmq.POLLIN)
-        self._socket.connect(f"tcp://{params.endpoint.authority}")
+        self._socket.setsockopt(zmq.IPV6, ":" in host)
+        self._socket.connect(f"tcp://{replace(params.endpoint, host=host).authority}")
 
     def call(self, endpoint: str, data: Mapping[str, object] | None, timeout: float) -> object:
         """The answer of an endpoint; `data` is None for one without input."""
@@ -115,17 +116,20 @@ class ZeroMq:
         self._context.destroy(linger=0)
 
 
-def _greeted(params: ConnectionParams) -> None:
-    """Raises OSError where nobody listens, ConnectFailed for something that is not ZeroMQ."""
+def _greeted(params: ConnectionParams) -> str:
+    """The number of the host that greets: of several, ZeroMQ tries one alone. Raises OSError where
+    nobody listens, ConnectFailed for something that is not ZeroMQ."""
     endpoint, said = params.endpoint, b""
     address = endpoint.host, endpoint.port
     with (
         socket.create_connection(address, params.timeouts.connect) as probe,
         contextlib.suppress(TimeoutError),
     ):
+        host: str = probe.getpeername()[0]
         said = probe.recv(len(GREETING))
     if said[:1] + said[9:] != GREETING[:1] + GREETING[9:]:
         raise errors.ConnectFailed(f"{endpoint.url} is no ZeroMQ server: it did not greet as one")
+    return host
 
 
 # ---------------------------------------------------------------- what the model reads and answers

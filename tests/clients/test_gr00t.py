@@ -172,6 +172,18 @@ def test_a_busy_server_is_told_from_a_silent_port_and_a_late_answer_is_never_tak
         connect(f"gr00t://127.0.0.1:{silent.getsockname()[1]}", timeouts=hasty)
 
 
+def test_an_address_of_ipv6() -> None:
+    try:
+        socket.create_server(("::1", 0), family=socket.AF_INET6).close()
+    except OSError:
+        pytest.skip("no IPv6 here")
+    server = gr00t()
+    server.host = "[::1]"
+    with server as url, connect(url.replace("127.0.0.1", "[::1]"), timeouts=QUICK) as policy:
+        policy.reset(TRIAL)
+        assert policy.infer(observation()).shape[1] == 14
+
+
 def test_without_pyzmq_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "zmq", None)
     with pytest.raises(HandshakeError, match="pip install pyzmq"):

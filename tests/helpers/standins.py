@@ -510,6 +510,7 @@ class Gr00t(StandIn):
     scheme = "gr00t"
     layout = "nested"
     codec: Callable[[Any], Any] = staticmethod(npy)
+    host = "127.0.0.1"
     token: str | None = None
 
     def __init__(self, *args: Any) -> None:
@@ -527,7 +528,8 @@ class Gr00t(StandIn):
 
         context = zmq.Context()
         socket = context.socket(zmq.REP)
-        self.port = socket.bind_to_random_port("tcp://127.0.0.1")
+        socket.setsockopt(zmq.IPV6, ":" in self.host)
+        self.port = socket.bind_to_random_port(f"tcp://{self.host}")
         over = threading.Event()
 
         def work() -> None:
