@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import re
 import stat
 import struct
+import sys
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
@@ -145,8 +145,9 @@ def inputs_hash(run: RunManifest) -> str:
 
 
 SUSPECT = re.compile(
-    "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u00ad\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff"
-    "\ud800-\udfff]|<[A-Za-z/!?]|javascript:",
+    "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u00ad\u034f\u061c\u115f\u1160\u17b4\u17b5\u180e\u200b-\u200f"
+    "\u2028-\u202e\u2060-\u206f\u2800\u3164\ufe00-\ufe0f\ufeff\uffa0\ud800-\udfff"
+    "\U000e0000-\U000e0fff]|<[A-Za-z/!?]|javascript:",
     re.IGNORECASE,
 )
 """Control, invisible and direction-changing characters; openings of tags; script addresses."""
@@ -202,8 +203,8 @@ def check_text(value: object, what: str, depth: int = 0) -> None:
         raise BundleError(f"{what} is nested more than {MAX_DEPTH} deep")
     if isinstance(value, str):
         _check_string(value, what)
-    elif isinstance(value, float) and not math.isfinite(value):
-        raise BundleError(f"{what} holds a number that is not finite")
+    elif isinstance(value, int | float) and not abs(value) <= sys.float_info.max:
+        raise BundleError(f"{what} holds a number that is not finite or too large")
     elif isinstance(value, Mapping):
         for name, inner in value.items():
             _check_string(name, what)

@@ -29,6 +29,7 @@ from robospa.schema import Sha256, one_of, pattern, read
 LOOK_ALIKE = str.maketrans(
     {
         **{"π": "pi", "ρ": "p", "ο": "o", "α": "a", "ν": "v", "χ": "x", "ι": "i", "κ": "k"},
+        **{"τ": "t", "β": "b", "λ": "a"},
         **{"а": "a", "в": "b", "е": "e", "к": "k", "м": "m", "н": "h", "о": "o", "р": "p"},
         **{"с": "c", "т": "t", "у": "y", "х": "x", "і": "i", "ј": "j", "ѕ": "s", "г": "r"},
         **{"ԁ": "d", "ԍ": "g", "ѵ": "v", "ӏ": "l", "п": "n", "ɡ": "g", "ɑ": "a", "ı": "i"},
@@ -36,12 +37,22 @@ LOOK_ALIKE = str.maketrans(
     }
 )
 """Greek and Cyrillic letters, and digits, as the Latin letters that they are taken for."""
+LATIN = re.compile("LATIN .*LETTER (?:SMALL CAPITAL )?([A-Z])(?: WITH .*)?")
+"""Unicode's name of a Latin letter, with or without strokes and hooks."""
+SCRIPTS = frozenset(("LATIN", "GREEK", "CYRILLIC", "CJK", "HANGUL", "HIRAGANA", "KATAKANA"))
+"""Scripts of names. Others, such as Lisu and Cherokee, have letters that nobody tells from Latin
+ones."""
 
 
 def skeleton(text: str) -> str:
     """`text` as a hurried reader sees it: letters alone, look-alikes as one."""
     plain = unicodedata.normalize("NFKD", text).casefold()
+    plain = "".join(m[1].lower() if (m := LATIN.fullmatch(_name(c))) else c for c in plain)
     return "".join(c for c in plain.translate(LOOK_ALIKE).translate(LOOK_ALIKE) if c.isalnum())
+
+
+def _name(character: str) -> str:
+    return unicodedata.name(character, "")
 
 
 OWNER = skeleton("RoboSPA")
@@ -74,6 +85,12 @@ def check_names(name: str, team: str) -> None:
             f"yours, such as {name[:40]!a} and your team's name"
         )
     for what, text in (("name", name), ("team", team)):
+        for c in unicodedata.normalize("NFKD", text):
+            if c.isalnum() and not c.isascii() and _name(c).partition(" ")[0] not in SCRIPTS:
+                raise BundleError(
+                    f"the model card's {what} {text[:80]!a} has the character {c!a} ({_name(c)}), "
+                    "which may be taken for another: use Latin letters"
+                )
         said = _said(text)
         if OWNER in said or "".join(said) == OWNER:
             raise BundleError(

@@ -308,7 +308,13 @@ def _shown(column: Column, metric: str, row: str, level: int) -> list[float] | i
 
 
 def all_entries(submissions: Sequence[Submission]) -> list[Entry]:
-    """Submissions and published models; BundleError if two have one name."""
+    """Submissions and published models; BundleError if two have one name or the same trials."""
+    owner: dict[str, Submission] = {}
+    for one in submissions:
+        if (first := owner.setdefault(one.rows, one)) is not one:
+            raise BundleError(
+                f"the submissions {first.folder.name} and {one.folder.name} are of the same trials"
+            )
     made = [*map(entry_of, submissions), *published_entries()]
     slugs = [entry.slug for entry in made]
     if twice := sorted({s for s in slugs if slugs.count(s) > 1}):

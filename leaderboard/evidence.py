@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Annotated
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from robospa.leaderboard.agreement import (
     CELL_LIE,
@@ -21,6 +21,7 @@ from robospa.leaderboard.agreement import (
     Agreement,
     Counts,
     agreement,
+    cells,
     contradictions,
 )
 from robospa.leaderboard.bundle import IN_REPOSITORY, BundleError, sha256
@@ -194,11 +195,14 @@ class ReplayEvidence(Struct, frozen=True, kw_only=True):
         )
 
 
+Chance = Annotated[float, Meta(ge=0, le=1)]
 Four = tuple[Count, Count, Count, Count]
 """Claimed successes and trials of a variant, and fresh ones."""
 RANKED = "sr1"
 """The metric whose power is stated: models are ranked by it, and by what follows from it."""
 TESTED = ("sr", RANKED)
+MOST_ALPHA = 0.1
+"""A test at a higher level is none."""
 
 
 class Reproduction(Struct, frozen=True, kw_only=True, dict=True):
@@ -211,11 +215,22 @@ class Reproduction(Struct, frozen=True, kw_only=True, dict=True):
     commitment: str = ""
     trials: Count
     repeated: Count = 0
-    alpha: Number
+    alpha: Annotated[float, Meta(gt=0, le=MOST_ALPHA)]
     categories: dict[str, str]
     counts: dict[Annotated[str, one_of(TESTED)], dict[str, Four]]
-    power: dict[str, Number]
-    cells: dict[str, Number]
+    power: dict[Annotated[str, pattern(r"0\.[0-9]{1,6}", "a number below 1")], Chance]
+    cells: dict[str, Chance]
+
+    def __post_init__(self) -> None:
+        found = [self.counts.get(metric, {}) for metric in TESTED]
+        fours = [four for counts in found for four in counts.values()]
+        if (
+            any(good > of or again > fresh or not of for good, of, again, fresh in fours)
+            or any(sum(four[3] for four in counts.values()) != self.trials for counts in found)
+            or any(name.rpartition("/")[0] not in self.categories for name in found[0] | found[1])
+            or not set(self.cells) <= set(cells(found[0], self.categories))
+        ):
+            raise ValueError("its counts, trials, categories and cells do not fit each other")
 
     @property
     def notices(self) -> float:
@@ -333,7 +348,8 @@ def _check_replay(again: ReplayEvidence, trials: int, where: str) -> None:
         raise BundleError(
             f"{where}: the replay found other outcomes, or objects elsewhere, than the bundle has"
         )
-    if again.trials != trials or again.identical + again.agrees != again.sampled:
+    came = again.identical + again.agrees
+    if again.trials != trials or came != again.sampled or came > trials:
         raise BundleError(f"{where}: the replay's counts are not those of the bundle")
     if again.sampled < (least := least_sample(trials)):
         raise BundleError(

@@ -1,10 +1,11 @@
 """Level 2, *replayed*: recorded actions fed to the simulator, ends compared with the records.
 
 A trial is *identical* if everything that a repeatable world decides is equal, the final state to
-the last bit, as on one kind of processor; it *agrees* if scene, instruction, end, success and
-progress are equal but the final state is not, as on another kind or with another build of the
-simulator; otherwise it is *different*. How far objects lie from where the records say is measured.
-Neither a GPU nor rendering is needed. Refuses nothing: the caller judges counts and distances.
+the last bit, as on one kind of processor; it *agrees* if scene, instruction, end, success, first
+choice and progress are equal but the final state is not, as on another kind or with another build
+of the simulator; otherwise it is *different*. How far objects lie from where the records say is
+measured. Neither a GPU nor rendering is needed. Refuses nothing: the caller judges counts and
+distances.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ from robospa.leaderboard.verify import Valid, read_traces
 from robospa.results.records.manifest import RunAbout
 from robospa.results.records.runs import differences
 from robospa.results.records.trial_record import TrialRecord
+from robospa.results.scoring.first_choice import first_choice, held_at_start
 from robospa.trial import TrialKey
 
 if TYPE_CHECKING:
@@ -39,6 +41,10 @@ if TYPE_CHECKING:
     from robospa.harness.world import World
 
 IDENTICAL, AGREES, DIFFERENT = "identical", "agrees", "different"
+LAST_BITS = {"digest", "physics_steps", "steps", "actions_digest"}
+"""What may be others on another processor, where the same end may come an action earlier."""
+FROM_EVENTS = {"first choice": first_choice, "subtasks at the start": held_at_start}
+"""Outcomes that no field of a record says."""
 LOST = 1e6
 """How far apart things lie [mm] of which a record says nonsense."""
 
@@ -137,6 +143,7 @@ def replay(
 def judge(claimed: TrialRecord, again: TrialRecord) -> Replayed:
     """How a trial that was played again compares with its record."""
     differs = [name for name in differences(claimed, again) if name != "end"]
+    differs += [name for name, of in FROM_EVENTS.items() if of(claimed) != of(again)]
     ends = (claimed.end, again.end)
     if "policy_error" in ends and claimed.end == again.end:
         # The refused action is not in the recording: one step less, with the same final state.
@@ -144,7 +151,7 @@ def judge(claimed: TrialRecord, again: TrialRecord) -> Replayed:
     elif claimed.end != again.end and ends != ("done", "policy_error"):  # what said so is not there
         differs.append("end")
     far = _apart(claimed, again)
-    kind = AGREES if set(differs) <= {"digest", "physics_steps"} else DIFFERENT
+    kind = AGREES if set(differs) <= LAST_BITS else DIFFERENT
     return Replayed(claimed.key, kind if differs else IDENTICAL, tuple(differs), again, apart=far)
 
 

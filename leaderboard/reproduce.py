@@ -33,7 +33,7 @@ from robospa.harness.seeds.attempt import expert_pool
 from robospa.harness.trial import salt_hash
 from robospa.leaderboard import agreement
 from robospa.leaderboard.bundle import MEGA, BundleError, canonical, parse_map, sha256
-from robospa.leaderboard.evidence import RANKED, TESTED, Reproduction
+from robospa.leaderboard.evidence import MOST_ALPHA, RANKED, TESTED, Reproduction
 from robospa.leaderboard.rules import Reference
 from robospa.leaderboard.verify import Valid
 from robospa.results.records.runs import Run
@@ -134,8 +134,6 @@ def read_block(path: Path, commitment: str) -> Block:
     return block
 
 
-MOST_ALPHA = 0.1
-"""A test at a higher level is none."""
 DROPS = (0.02, agreement.LIE, 0.1)
 """Losses of success for which the power is stated."""
 

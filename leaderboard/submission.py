@@ -107,11 +107,12 @@ SLUG = re.compile(r"[a-z0-9][a-z0-9-]{0,63}")
 
 @dataclass(frozen=True)
 class Submission:
-    """A folder read back. `scores` and `outcomes` are the bundle's files as they are, `bundle` is
-    its hash."""
+    """A folder read back. `scores` and `outcomes` are the bundle's files as they are, `bundle` and
+    `rows` are the hashes of all of it and of its rows."""
 
     folder: Path
     bundle: str
+    rows: str
     card: Card
     run: RunManifest
     scores: Mapping[str, object]
@@ -201,8 +202,9 @@ def add(
         raise BundleError("a submission's name is of small letters, digits and hyphens")
     check_folder(name)
     folder = home / name
-    address = _asked(folder, valid) or address
-    if address:
+    if address == IN_REPOSITORY:
+        raise BundleError(f"an address is that of a bundle elsewhere; {BUNDLE} names one beside it")
+    if address := _asked(folder, valid) or address:
         evidence["address"] = address
     read_evidence(evidence, valid.manifest.bundle, "the submission")
     filmed = {key: r for key, r in valid.run.records.items() if r.video}
@@ -314,6 +316,7 @@ def read_submission(folder: Path) -> Submission:
     return Submission(
         folder=folder,
         bundle=manifest.bundle,
+        rows=manifest.chain.last,
         card=card,
         run=run,
         scores=parts["scores.json"],

@@ -25,7 +25,7 @@ from robospa.results.records.manifest import (
     read_bytes,
     read_manifest,
 )
-from robospa.results.records.trial_record import INTERRUPTED, TrialRecord
+from robospa.results.records.trial_record import INTERRUPTED, Roles, TrialRecord
 from robospa.schema import parse_json, read
 from robospa.text import some
 from robospa.trial import TrialKey
@@ -135,7 +135,9 @@ def from_data(data: object) -> TrialRecord:
     if unknown := [*(data.keys() - FIELDS), *(data["key"].keys() - KEY_FIELDS)]:
         names = ", ".join(sorted(unknown))[:200]
         raise ValueError(f"unknown fields {names}: written by a newer version?")
-    return read(TrialRecord, data, "the trial record")
+    record = read(TrialRecord, data, "the trial record")
+    read(Roles, record.diagnostics, "the trial record's diagnostics")
+    return record
 
 
 def read_file(path: Path) -> list[TrialRecord]:

@@ -129,6 +129,16 @@ class TrialRecord:
     """Path of the video in the run's folder, which follows the record; empty for none."""
 
 
+@dataclass(frozen=True)
+class Roles:
+    """The diagnostics that first choices follow from."""
+
+    roles: Mapping[str, tuple[Integer, ...]] = field(default_factory=dict)
+    """Subtasks by object name."""
+    pressed: tuple[str, ...] = ()
+    """Objects that are pressed."""
+
+
 def query_entries(asked: Sequence[int], steps: int) -> dict[str, object]:
     """What a record of `steps` actions keeps of its queries: `asked` says how many actions had been
     begun at each."""

@@ -118,6 +118,9 @@ def test_all_faults_of_a_card_are_said_at_once(tmp_path: Path) -> None:
         ("G0-l (official)", "Us"),
         ("RDT, published", "Us"),
         ("Ｒ\u0044Ｔ", "Us"),  # wide letters
+        ("RD\u03a4", "Us"),  # a Greek Tau
+        ("R\u0110T", "Us"),  # with a stroke
+        ("Rᴅᴛ", "Us"),  # small capitals
         ("Ours", "RoboSPA paper"),
         ("Ours", "The R0bo-SPA authors"),
         ("Ours", "RoboSРА"),  # the last two letters are Cyrillic
@@ -127,6 +130,22 @@ def test_all_faults_of_a_card_are_said_at_once(tmp_path: Path) -> None:
 def test_names_of_the_paper_are_reserved(name: str, team: str) -> None:
     with pytest.raises(BundleError, match=r"is that of the paper's|has the benchmark's name in it"):
         to_card({**CARD_DATA, "name": name, "team": team})
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("\ua4e3\ua4d3\ua4d4", "LISU LETTER ZHA"),
+        ("\u13a1DT", "CHEROKEE LETTER E"),
+        ("pi\u0660.5", "ARABIC-INDIC DIGIT ZERO"),
+        ("RDT\u3164", "invisible"),
+    ],
+)
+def test_letters_that_nobody_tells_from_latin_ones_are_in_no_name(name: str, words: str) -> None:
+    with pytest.raises(BundleError, match=words):
+        to_card({**CARD_DATA, "name": name})
+    for other in ("智元 GO", "Łódź net", "β-VLA"):
+        to_card({**CARD_DATA, "name": other})
 
 
 @pytest.mark.parametrize(

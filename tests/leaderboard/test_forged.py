@@ -245,6 +245,10 @@ FORGERIES: list[tuple[Forgery, str]] = [
     # records that cannot be (more of them below), and policies
     (record(steps=0), "nothing happens without any"),
     (record(end="vanished"), "'end' must be one of success, "),
+    (record(diagnostics={"roles": {"a": 5}}), "'roles' must be a list"),
+    (record(diagnostics={"pressed": 5}), "'pressed' must be a list, not 5"),
+    (field(layout.RUN, "about", "machine", cores=10**400), "not finite or too large"),
+    (put(layout.SCORES, b"[1" + 400 * b"0" + b"]"), "not finite or too large"),
     (record(success=1), "'success' must be true or false, not 1"),
     (record(instruction="x"), "has another sentence ('x', not 'level 1: sum to 1')"),
     (record(scene_digest="0" * 16), "has another scene ('0000000000000000', not "),

@@ -71,6 +71,23 @@ def test_objects_that_lie_elsewhere_are_refused(honest: Path) -> None:
     assert not structs.replace(evidence, median=21.0).holds
 
 
+def test_other_things_that_were_chosen_first_are_not_left_out(honest: Path) -> None:
+    """No field of a record has them, and models are ranked by what follows from them."""
+    (trial, *_) = (t.record for t in replayed(honest, 40).trials if t.record and t.record.success)
+    wrong = {**trial.events[0], "kind": "wrong_object", "object": "other"}
+    held = {**trial.events[0], "kind": "subtask_done", "time": 0.0, "index": 1}
+    for event, words in ((wrong, "first choice"), (held, "subtasks at the start")):
+        found = judge(trial, replace(trial, events=(event, *trial.events)))
+        assert (found.kind, found.differs) == ("different", (words,))
+
+
+def test_an_end_that_comes_an_action_earlier_is_the_same_outcome(honest: Path) -> None:
+    (trial, *_) = (t.record for t in replayed(honest, 5).trials if t.record and t.record.success)
+    again = replace(trial, steps=trial.steps - 1, actions_digest="other", digest="other")
+    assert judge(trial, again).kind == "agrees"
+    assert judge(trial, replace(again, done=trial.done - 1)).kind == "different"
+
+
 def test_another_physics_does_not_hold(honest: Path) -> None:
     other = replace(REFERENCE, world="bundle_fakes:OtherPhysics")
     made = replayed(honest, 40, other)

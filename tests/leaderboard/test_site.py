@@ -89,6 +89,13 @@ def test_a_replay_with_other_final_states_has_a_badge_of_its_own(tmp_path: Path)
     assert entry.badges == ("valid", "outcomes")
 
 
+def test_the_same_trials_are_no_two_entries(kept: Path, tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        shutil.copytree(kept, tmp_path / name)
+    with pytest.raises(BundleError, match="one and two are of the same trials"):
+        all_entries(read_submissions(tmp_path))
+
+
 def test_names_that_are_scripts_stay_text(tmp_path: Path) -> None:
     entry = published_entries()[0]
     found, about = entry.column.results, ((EVIL, EVIL),)
@@ -145,7 +152,18 @@ def test_every_file_of_the_bundle_is_held_against_its_hash(folder: Path) -> None
                 (lambda d: d["replayed"].update(trials=21), "not those of the bundle"),
                 (lambda d: d["replayed"].update(challenge="1"), "fewer than 8"),
                 (lambda d: d["replayed"].update(bundle="0" * 64), "replay is of another bundle"),
-                (lambda d: d["reproduced"].update(trials=1, power={"0.05": 0.0}), "needs 95 %"),
+                (lambda d: d["reproduced"].update(power={"0.05": 0.0}), "needs 95 %"),
+                (lambda d: d["reproduced"].update(alpha=0), "a number > 0.0, not 0"),
+                *(
+                    (lambda d, new=new: d["reproduced"].update(new), "do not fit each other")
+                    for new in (
+                        {"counts": {}},
+                        {"trials": 1},
+                        {"categories": {}},
+                        {"cells": {"overall/0": 1.0}},
+                    )
+                ),
+                (lambda d: d["replayed"].update(sampled=21, identical=21), "not those of the"),
                 (lambda d: d["reproduced"].pop("bundle"), "lacks the field 'bundle'"),
                 (lambda d: d["reproduced"].update(bundle="0" * 64), "is of another bundle"),
                 (
@@ -205,6 +223,8 @@ def test_what_was_handed_in_has_to_fit_the_bundle(tmp_path: Path) -> None:
         add(valid, [], home, "mine")
     with pytest.raises(BundleError, match="small letters"):
         add(valid, [], home, "../mine")
+    with pytest.raises(BundleError, match="names one beside it"):
+        add(valid, [], home, "mine", "bundle.zip")
     (folder / "model.toml").write_text(CARD_TEXT)
     (folder / "bundle.txt").write_text(f"https://a.org/b.zip\n{size}\n{valid.manifest.bundle}\n")
     assert list(left_out(home)) == ["mine"] and read_submissions(home) == []
