@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 IDENTICAL, AGREES, DIFFERENT = "identical", "agrees", "different"
 LAST_BITS = {"digest", "physics_steps", "steps", "actions_digest"}
-"""What may be others on another processor, where the same end may come an action earlier."""
+"""What may be others on another processor, where the same end may come earlier."""
 FROM_EVENTS = {"first choice": first_choice, "subtasks at the start": held_at_start}
 """Outcomes that no field of a record says."""
 LOST = 1e6

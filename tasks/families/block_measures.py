@@ -2,8 +2,8 @@
 
 All blocks of a scene share one colour and differ in one measure only; rank 1 is the largest. Rank,
 place, name and order of the blocks are independent, so only the measure tells the target. Length is
-the extent from left to right: the shortest blocks are wider than long. Area is that of the square
-base; all blocks of a scene are equally high there.
+along a block's own x, which but for its turn is from left to right: the shortest blocks are wider
+than long. Area is that of the square base; all blocks of a scene are equally high there.
 """
 
 import itertools

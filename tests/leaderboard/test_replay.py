@@ -81,7 +81,7 @@ def test_other_things_that_were_chosen_first_are_not_left_out(honest: Path) -> N
         assert (found.kind, found.differs) == ("different", (words,))
 
 
-def test_an_end_that_comes_an_action_earlier_is_the_same_outcome(honest: Path) -> None:
+def test_an_end_that_comes_earlier_is_the_same_outcome(honest: Path) -> None:
     (trial, *_) = (t.record for t in replayed(honest, 5).trials if t.record and t.record.success)
     again = replace(trial, steps=trial.steps - 1, actions_digest="other", digest="other")
     assert judge(trial, again).kind == "agrees"
