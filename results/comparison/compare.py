@@ -254,8 +254,10 @@ def _group_row(
         p = boschloo(pairs[0].first, pairs[0].second) if exact else p_of_interval(honest)
         return Difference(*row, p, over_tasks=other)
     b, c = discordant(pairs)
-    # One weight for every trial holds inside a category; above it only the interval is fair.
-    pooled = kind in ("variant", "task", "category") and rates
+    # Inside a category every pair weighs the same, unless variants lack some; elsewhere only the
+    # interval is fair.
+    shares = {round(w / x.first.trials, 12) for w, x in zip(weights, pairs, strict=True)}
+    pooled = kind in ("variant", "task", "category") and rates and len(shares) == 1
     p = mcnemar_mid_p(b, c) if pooled else p_of_interval(honest)
     return Difference(*row, p, b, c, over_tasks=other)
 

@@ -7,7 +7,7 @@ variant anew, for all latencies together.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from robospa.results.comparison.pairs import check_comparable, common_seeds, paired_variants
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.models import IncomparableError, ModelResults
+from robospa.results.scoring.models import IncomparableError, ModelResults, results_of_records
 from robospa.results.scoring.scores import Variant, weights_of
 from robospa.results.statistics.intervals import Estimate, interval_of, paired_mean
 from robospa.results.statistics.significance import p_of_interval
@@ -97,14 +97,14 @@ def latency_curve(models: Sequence[ModelResults]) -> LatencyCurve:
         raise IncomparableError(
             "a curve is of one policy and one way to switch between chunks, with one run a latency"
         )
-    first = models[0]
     for model in models[1:]:
-        check_comparable(first, model)
-    shared = [v for v in first.trials if all(v in model.trials for model in models)]
-    seeds = {v: _shared_seeds(models, v) for v in shared}
-    variants = [v for v in shared if seeds[v]]
-    if not variants:
+        check_comparable(models[0], model)
+    shared = [v for v in models[0].trials if all(v in model.trials for model in models)]
+    seeds = {v: found for v in shared if (found := _shared_seeds(models, v))}
+    if not seeds:
         raise IncomparableError("these runs share no seed: run them on the same ones")
+    models = [_cut(model, seeds) for model in models]
+    first, variants = models[0], list(seeds)
     weights = weights_of(variants, first.categories)
     outcomes = [
         np.array([[m.trials[v][seed].success for seed in seeds[v]] for m in models])
@@ -117,7 +117,7 @@ def latency_curve(models: Sequence[ModelResults]) -> LatencyCurve:
     return LatencyCurve(
         first.manifest.policy.name,
         next(iter(rules)) or "wait",
-        sum(len(found) for found in seeds.values() if found),
+        sum(map(len, seeds.values())),
         points,
         _half(np.array(latencies), outcomes, weights),
     )
@@ -128,6 +128,13 @@ def _shared_seeds(models: Sequence[ModelResults], variant: Variant) -> list[int]
     for model in models[1:]:
         found &= set(common_seeds(models[0], model, variant))
     return sorted(found)
+
+
+def _cut(model: ModelResults, seeds: Mapping[Variant, Sequence[int]]) -> ModelResults:
+    """`model` as if only these trials had been run."""
+    known = [model.trials[v][seed] for v, found in seeds.items() for seed in found]
+    records = {record.key: record for record in known}
+    return results_of_records(model.name, [*records], records, model.manifest)
 
 
 def _point(

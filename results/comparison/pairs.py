@@ -8,6 +8,7 @@ from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.models import COMPARISON, IncomparableError, ModelResults, check_alike
 from robospa.results.scoring.scores import Variant, sample_of, succeeded, weights_of
 from robospa.results.statistics.samples import Sample
+from robospa.text import counted
 from robospa.trial import METRIC_CATEGORIES
 
 
@@ -130,10 +131,9 @@ def notes(
             )
     if paired:
         found.append("Paired: trials on the same seeds are held against each other.")
-        pairs = {v: len(common_seeds(first, second, v)) for v in common}
-        alone = sum(max(first.listed[v], second.listed[v]) - pairs[v] for v in common)
+        alone = sum(len(first.trials[v].keys() ^ second.trials[v].keys()) for v in common)
         if alone:
-            found.append(f"{alone} listed trials have no result on one of the sides: left out.")
+            found.append(f"{counted(alone, 'trial')} with a result on one side alone: left out.")
         blind = [side.name for side in (first, second) if side.manifest.policy.seeded is False]
         if blind:
             found.append(

@@ -12,7 +12,7 @@ from robospa.results.records.runs import by_setting
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.models import IncomparableError, ModelResults, results_of_run
 from robospa.results.statistics.intervals import difference, paired_difference, wilson
-from robospa.results.statistics.significance import boschloo, mcnemar_mid_p
+from robospa.results.statistics.significance import boschloo, mcnemar_mid_p, p_of_interval
 from robospa.trial import TrialKey
 
 SIZE, MUGS, BOTTLES = "Pick_Blocks_Size", "Pick_Mugs_Distance", "Put_Bottles_Dustbin"
@@ -129,7 +129,24 @@ def test_lost_trials_are_left_out_in_pairs_and_counted(tmp_path: Path) -> None:
     two = side(tmp_path / "b", outcomes(SIZE, 1, [0, 1, 1]))
     found = compare_results(one, two)
     assert found.cells[0].trials == 2
-    assert any("1 listed trials have no result" in note for note in found.notes)
+    assert any("1 trial with a result on one side alone" in note for note in found.notes)
+
+
+def test_a_category_of_unequal_variants_is_judged_by_its_interval(tmp_path: Path) -> None:
+    """The first wins more pairs, and the second is ahead, because variants count the same."""
+    one, two = outcomes(SIZE, 1, [1] * 12 + [0] * 88), outcomes(SIZE, 1, [0] * 100)
+    one, two = one + outcomes("Other", 1, [0] * 4), two + outcomes("Other", 1, [1] * 4)
+    found = compare_results(side(tmp_path / "a", one), side(tmp_path / "b", two))
+    row = group(found, "GAC", 1)
+    assert (row.only_first, row.only_second, round(row.estimate.value, 2)) == (12, 4, -0.44)
+    assert row.p == p_of_interval(row.estimate) == group(found, "spatial", 1).p > 0.05
+
+
+def test_seeds_that_only_one_side_has_are_counted_on_both(tmp_path: Path) -> None:
+    made = outcomes(SIZE, 1, [1, 0] * 5)
+    found = compare_results(side(tmp_path / "a", made[:6]), side(tmp_path / "b", made[3:]))
+    assert found.cells[0].trials == 3
+    assert any("7 trials with a result on one side alone" in note for note in found.notes)
 
 
 def test_notes_tell_of_versions_and_of_policies_that_ignore_their_seed(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +40,25 @@ def at(folder: Path, latency: float, good: int, switching: str = "wait") -> Mode
     ]
     clock = {"latency": f"{latency:g}ms", "latency_ms": latency, "switching": switching}
     return results_of_run(make_run(folder, records, settings={"clock": clock}))
+
+
+def test_a_point_is_over_the_trials_that_all_latencies_have(tmp_path: Path) -> None:
+    """What one run lacks counts in none, and a variant that shares no seed is left out."""
+    runs = [at(tmp_path / f"{ms:g}", ms, 20) for ms in (0.0, 100.0)]
+    (variant,) = runs[0].trials
+    one, other = dict(runs[0].trials[variant]), dict(runs[1].trials[variant])
+    few = {seed: record for seed, record in other.items() if seed < 25}
+    records = {
+        replace(r.key, level=2, seed=place): replace(r, key=replace(r.key, level=2, seed=place))
+        for place, r in ((0, one[0]), (1, other[1]))
+    }
+    alone = [{(variant[0], 2): {key.seed: record}} for key, record in records.items()]
+    first = replace(runs[0], trials={variant: one, **alone[0]})
+    second = replace(runs[1], trials={variant: few, **alone[1]})
+    found = latency_curve([first, second])
+    assert [p.success.value for p in found.points] == [0.8, 0.8]
+    assert found.trials == 25
+    assert found.points[1].gap is not None and found.points[1].gap.value == 0.0
 
 
 @pytest.fixture
