@@ -18,7 +18,7 @@ from robospa.results.records.action_problems import described, problem_counts
 from robospa.results.records.trial_record import EventRow, TrialRecord
 from robospa.results.tables import Table, TableCell, TableRow, html_fragment
 from robospa.text import plain
-from robospa.trial import SPATIAL, TrialKey
+from robospa.trial import BASIC, SPATIAL, TrialKey
 
 NAMES = {
     "target_grounding": "target grounding",
@@ -64,7 +64,8 @@ def label(record: TrialRecord) -> Failure | None:
         return _at_end(record, "invalid_action", record.message or "the answer was refused")
     events = tuple(event for event in record.events if event["kind"] != "clutter_moved")
     record = replace(record, events=events)
-    cause = _spatial(record) if record.category in SPATIAL else root_of(record)
+    spatial = record.category in (*SPATIAL, *BASIC)
+    cause = _spatial(record) if spatial else root_of(record)
     if cause is None:
         evidence = "; ".join([_idle(record), *(one.sentence for one in problem_counts([record]))])
         return _at_end(record, "no_attempt", evidence)

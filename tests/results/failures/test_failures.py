@@ -9,7 +9,7 @@ from fake_runs import events, trial_record
 
 from robospa.results.failures.labels import counts_table, distribution, label
 from robospa.results.records.trial_record import TrialRecord
-from robospa.trial import TrialKey
+from robospa.trial import BASIC, TrialKey
 
 Row = tuple[Any, ...]
 PICK = {"target": [0], "other": []}
@@ -74,7 +74,7 @@ def test_an_answer_that_cannot_be_executed_has_its_own_type() -> None:
     ],
 )
 def test_spatial_rules(rows: list[Row], expected: str) -> None:
-    assert kind(failed("CVR", rows)) == expected
+    assert {kind(failed(category, rows)) for category in ("CVR", *BASIC)} == {expected}
 
 
 def test_collisions_with_clutter_change_no_type() -> None:
