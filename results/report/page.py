@@ -119,6 +119,7 @@ def page(
             )
         ],
         missing=report.missing,
+        lacking=sum(bool(c.missing) for m in report.models for c in m.scores.cells.values()),
         errors=[line for line in report.findings if line.startswith("error")],
         warnings=[line for line in report.findings if not line.startswith("error")],
         tables=for_page(report.tables),

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fake_runs import EVIL, KNOWN, RECORDS, make_run, shown
+from fake_runs import EVIL, KNOWN, RECORDS, make_run, shown, write
 
 from robospa.results.comparison.compare import compare_results
 from robospa.results.paper.published import load
 from robospa.results.records.runs import film_name
 from robospa.results.records.trial_record import EventRow
-from robospa.results.report.page import panels, write_report
+from robospa.results.report.page import page, panels, write_report
 from robospa.results.report.report import make_report
 from robospa.results.report.run_card import percent
 from robospa.results.report.trials import event_row, happened
@@ -124,6 +124,12 @@ def test_of_one_trial_a_cell_no_whiskers_are_drawn(tmp_path: Path) -> None:
     ((_, line, none, first),) = found[1].lines
     assert (line, first, none) == ("M10 60.0L35 60.0", "M10 60.0L35 60.0", "")
     assert found[3].lines[0][2].count("V") == 2 and found[1].category == "GAC"
+
+
+def test_variants_that_lack_trials_are_counted_without_the_reasons(tmp_path: Path) -> None:
+    made = [shown("Pick_Blocks_Size", n, s, True) for n in range(1, 5) for s in (0, 1)]
+    run = write(tmp_path / "run", made, [replace(r.key, seed=900) for r in made[::2]])
+    assert "4 variants lack trials" in page(make_report(run), [], tmp_path)
 
 
 def test_runs_of_different_variants_have_cards_of_what_both_ran(tmp_path: Path) -> None:
