@@ -25,7 +25,7 @@ from robospa.results.scoring.comparable import (
 )
 from robospa.results.scoring.first_choice import first_choice, held_at_start
 from robospa.results.scoring.grounding import Grounding, Place, groundings, tally_of
-from robospa.results.scoring.models import results_of_run
+from robospa.results.scoring.models import check_same, results_of_run, setting_of
 from robospa.results.scoring.safety import RunSafety, read_safety
 from robospa.results.scoring.scores import Scores, score_run
 from robospa.results.tables import Table
@@ -52,18 +52,25 @@ class LoadedRun(Run):
 
     def scores(self, ci: str = "wilson") -> Scores:
         """All scores with their intervals, by variant, task, category, dimension and over all:
-        `run.scores().overall[0].values["sr1"]` is the mean over levels of SR@1."""
-        return score_run(self, ci)
+        `run.scores().overall[0].values["sr1"]` is the mean over levels of SR@1. IncomparableError
+        of several robots, scene modes or splits, over which no mean is taken."""
+        return score_run(self._of_one_setting(), ci)
 
     def comparable(self, ci: str = "wilson") -> Scores:
         """The same over the trials of SDE, CVR and MIP that compare (`docs/statistics.md`); columns
         `lead` [m] and `asked_again` of the frame say why."""
-        return comparable(results_of_run(self, ci=ci)).scores
+        return comparable(results_of_run(self._of_one_setting(), ci=ci)).scores
 
     def grounding(self) -> dict[Place, Grounding]:
         """What was chosen and what came of it, by task, category or dimension, and level (0:
         all): `run.grounding()["GAC", 0].execution` (`docs/statistics.md`)."""
-        return groundings(r for r in self.records.values() if finished(r))
+        records = self._of_one_setting().records.values()
+        return groundings(record for record in records if finished(record))
+
+    def _of_one_setting(self) -> LoadedRun:
+        name = f"{self.folder.name} (robospa.results.records.runs.by_setting takes it apart)"
+        check_same([(name, setting_of(self.keys, self.manifest))], ())
+        return self
 
     def profile(self, metric: str = "sr1", by: str = "all") -> Profile:
         """What each axis of a profile costs, paired with the clean trials; `by` "category", "level"

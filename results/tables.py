@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING
 
-from robospa.results.paper.rounding import rounded
+from robospa.results.paper.rounding import shown
 from robospa.text import interval_text, markdown_table, plain, plain_console
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def estimate_cell(estimate: Estimate | None, style: str = "z.1f", sign: str = ""
     if estimate is None:
         return DASH
     ends = (100 * estimate.value, 100 * estimate.low, 100 * estimate.high)
-    return TableCell(interval_text(*map(rounded, ends), style=style), *ends, sign=sign)
+    return TableCell(interval_text(*map(shown, ends), style=style), *ends, sign=sign)
 
 
 DASH = TableCell("–")
@@ -231,9 +231,11 @@ def _html_entry(entry: TableCell) -> str:
     if entry.low is not None and entry.high is not None:
         lacks = f"; {entry.missing} trials missing" if entry.missing else ""
         if lacks and entry.bounds is not None:
-            lacks += f", so between {entry.bounds[0]:z.1f} and {entry.bounds[1]:z.1f}"
-        hint = f' title="95 %: {entry.low:.1f} to {entry.high:.1f}{lacks}"'
-        hint += f' data-interval="[{entry.low:z.1f}, {entry.high:z.1f}]"'
+            worst, best = map(shown, entry.bounds)
+            lacks += f", so between {worst:.1f} and {best:.1f}"
+        low, high = shown(entry.low), shown(entry.high)
+        hint = f' title="95 %: {low:.1f} to {high:.1f}{lacks}"'
+        hint += f' data-interval="[{low:.1f}, {high:.1f}]"'
     sign = f"<sup>{_html_text(entry.sign)}</sup>" if entry.sign else ""
     return f"<td{kind}{hint}>{_html_text(entry.text)}{sign}</td>"
 

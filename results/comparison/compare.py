@@ -21,6 +21,7 @@ from robospa.results.comparison.pairs import (
 )
 from robospa.results.comparison.sample_size import MARGIN, judged
 from robospa.results.paper.columns import published_results
+from robospa.results.paper.rounding import shown
 from robospa.results.records.manifest import RunError
 from robospa.results.records.runs import MARK, Run, by_setting, read_part, setting_name
 from robospa.results.scoring.grounding import differences
@@ -49,7 +50,7 @@ from robospa.results.statistics.significance import (
     p_of_interval,
 )
 from robospa.results.tables import Table, TableCell, TableRow, estimate_cell
-from robospa.text import counted, percent_text
+from robospa.text import counted
 from robospa.trial import BASIC, CATEGORIES, DIMENSIONS, METRIC_NAMES
 
 
@@ -111,18 +112,21 @@ class RunComparison:
         if not self.groups:
             return ""
         row = self.groups[-1]
-        low, high = 100 * row.estimate.low, 100 * row.estimate.high
+        e = row.estimate
+        first, second, gap, low, high = (
+            shown(100 * x) for x in (row.first, row.second, e.value, e.low, e.high)
+        )
         within = counted(100 * self.margin, "point")
-        shown = {
+        said = {
             "better": f"{self.first} is better",
             "worse": f"{self.first} is worse",
             "equal": f"they are equal within {within}",
         }.get(self.outcome, f"underpowered: {self.needed:,} would tell {within} apart")
         same = "the same" if self.paired else "as many"
         return (
-            f"{METRIC_NAMES[self.metric]}: {self.first} {100 * row.first:z.1f}, {self.second} "
-            f"{100 * row.second:z.1f} on {same} {counted(row.trials, 'trial')}; {shown} "
-            f"(difference {100 * row.estimate.value:+z.1f}, 95 %: {low:+z.1f} to {high:+z.1f})."
+            f"{METRIC_NAMES[self.metric]}: {self.first} {first:.1f}, {self.second} {second:.1f} "
+            f"on {same} {counted(row.trials, 'trial')}; {said} "
+            f"(difference {gap:+.1f}, 95 %: {low:+.1f} to {high:+.1f})."
         )
 
     def table(self, variants: bool = False) -> Table:
@@ -303,19 +307,17 @@ def difference_table(found: RunComparison, rows: Sequence[Difference], title: st
 
 def _table_row(row: Difference, several: bool, paired: bool) -> TableRow:
     partly = f" ({row.variants} of {row.listed})" if row.variants < row.listed else ""
-    e = row.estimate
     cells = [
         f"L{row.level}" if row.level else "mean",
-        f"{100 * row.first:z.1f}",
-        f"{100 * row.second:z.1f}",
-        percent_text(e.value, e.low, e.high, style="+z.1f"),
+        *(f"{shown(100 * rate):.1f}" for rate in (row.first, row.second)),
+        estimate_cell(row.estimate, "+z.1f").text,
         chance(row.p),
         chance(row.q) if row.kind in ("variant", "category") else "",
         str(row.trials),
     ]
     if several:
         o = row.over_tasks
-        cells.append(f"[{100 * o.low:+z.1f}, {100 * o.high:+z.1f}]" if o else "")
+        cells.append(f"[{shown(100 * o.low):+.1f}, {shown(100 * o.high):+.1f}]" if o else "")
     if paired:
         cells += [str(row.only_first), str(row.only_second)]
     return TableRow(f"{row.label}{partly}", tuple(map(TableCell, cells)))

@@ -13,6 +13,7 @@ from itertools import zip_longest
 
 from robospa.results.comparison.compare import chance
 from robospa.results.failures.attribution import roles_of
+from robospa.results.paper.rounding import shown
 from robospa.results.records.manifest import RunError
 from robospa.results.records.runs import Run, finished
 from robospa.results.records.trial_record import PROCESSOR, TrialRecord
@@ -77,7 +78,9 @@ class Cost:
     @property
     def row(self) -> TableRow:
         """As it stands in the table."""
-        rates = [TableCell(f"{100 * rate:.1f}", 100 * rate) for rate in (self.clean, self.here)]
+        rates = [
+            TableCell(f"{shown(100 * rate):.1f}", 100 * rate) for rate in (self.clean, self.here)
+        ]
         tests = [DASH.text if self.axis in NO_COST else chance(p) for p in (self.p, self.holm)]
         gap = estimate_cell(self.difference, "+z.1f", PRINTED_OTHERWISE * self.found)
         texts = map(TableCell, (*tests, f"{self.lost}/{self.won}"))

@@ -23,6 +23,7 @@ from robospa.results.figures.series import (
     spread,
     whiskers,
 )
+from robospa.results.paper.rounding import shown
 from robospa.results.scoring.scores import Scores
 from robospa.results.statistics.intervals import Estimate
 from robospa.trial import CATEGORY_NAMES, PROCEDURAL, SPATIAL
@@ -199,7 +200,7 @@ def _heat_number(axis: Axes, line: int, column: int, value: float) -> None:
         corner = (column - 0.5, line - 0.5)
         axis.add_patch(Rectangle(corner, 1, 1, fill=False, hatch="////", lw=0, ec="#9aa0a8"))
         return
-    text = f"{value:.0f}" if abs(value - round(value)) < 0.05 else f"{value:.1f}"
+    text = f"{value:.0f}" if abs(value - round(value)) < 0.05 else f"{shown(value):.1f}"
     colour = "#ffffff" if value < 55 else "#101010"
     axis.text(column, line, text, ha="center", va="center", fontsize=5, color=colour)
 

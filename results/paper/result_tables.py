@@ -323,5 +323,5 @@ def _lost(column: Column, metric: str, row: str, level: int) -> str:
     ends = part.bounds(metric)
     if ends is None:
         return f"{name} L{level} lacks {part.missing}"
-    low, high = (rounding.text(100 * end) for end in ends)
+    low, high = (f"{rounding.shown(100 * end):.1f}" for end in ends)
     return f"{name} L{level} lacks {part.missing}, {METRIC_NAMES[metric]} between {low} and {high}"

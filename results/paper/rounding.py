@@ -25,6 +25,12 @@ def rounded(value: float, digits: int = 1) -> float:
     return math.copysign(math.floor(abs(value) * scale + 0.5) / scale, value) + 0.0
 
 
+def shown(value: float) -> float:
+    """`value`, which may be a mean of fractions, as it is printed: not noise in its last bits, but
+    its decimals decide what is half."""
+    return rounded(round(value, 9))
+
+
 def is_tie(value: float) -> bool:
     """Whether `value` lies halfway between two printed decimals, but for binary noise."""
     scaled = abs(value) * 10.0

@@ -74,7 +74,7 @@ def _open_notes(columns: Sequence[Column], level: int) -> list[str]:
         notes += not_run_note(column, [level])
         part = column.scores.part(rounding.OVERALL, level)
         if part is not None and part.missing:
-            low, high = (100 * end for end in part.bounds("sr") or (0.0, 1.0))
+            low, high = (rounding.shown(100 * end) for end in part.bounds("sr") or (0.0, 1.0))
             notes.append(
                 f"{MISSING} {column.title}: {part.missing} trials at L{level} have no result; over "
                 f"what is listed SR lies between {rounding.text(low)} and {rounding.text(high)}."

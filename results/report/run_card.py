@@ -12,7 +12,7 @@ from msgspec import to_builtins
 
 from robospa.results.failures.labels import NAMES, failures_of
 from robospa.results.paper.origin import SPLITS
-from robospa.results.paper.rounding import OVERALL
+from robospa.results.paper.rounding import OVERALL, shown
 from robospa.results.records.action_problems import grouped, problem_lines
 from robospa.results.records.manifest import RunAbout, departures
 from robospa.results.records.runs import (
@@ -239,11 +239,12 @@ def missing_lines(scores: Scores) -> list[str]:
     """One sentence for every variant that lacks trials."""
     lines = []
     for cell in scores.cells.values():
-        sr, first = (cell.bounds(metric) or (0.0, 1.0) for metric in ("sr", "sr1"))
+        ends = zip(*(cell.bounds(metric) or (0.0, 1.0) for metric in ("sr", "sr1")), strict=True)
+        worst, best = ([f"{shown(100 * x):.1f}" for x in side] for side in ends)
         text = (
             f"{cell.task} L{cell.level}: {cell.missing} of {cell.listed} trials are missing; if "
-            f"all had failed SR would be {100 * sr[0]:.1f} and SR@1 {100 * first[0]:.1f}, if all "
-            f"had succeeded {100 * sr[1]:.1f} and {100 * first[1]:.1f}"
+            f"all had failed SR would be {worst[0]} and SR@1 {worst[1]}, if all had succeeded "
+            f"{best[0]} and {best[1]}"
         )
         lines += [text] * bool(cell.missing)
     return lines

@@ -7,9 +7,12 @@ import pytest
 from fake_runs import events, make_run, outcomes, record, write
 
 from robospa.results.comparison.compare import Difference, RunComparison, by_axis, compare_results
-from robospa.results.paper.columns import published_results
+from robospa.results.paper.columns import published_results, run_column
+from robospa.results.paper.published import load
+from robospa.results.paper.result_tables import summary_table
 from robospa.results.records.runs import by_setting
 from robospa.results.records.trial_record import TrialRecord
+from robospa.results.report.run_card import score_table
 from robospa.results.scoring.models import IncomparableError, ModelResults, results_of_run
 from robospa.results.statistics.intervals import difference, paired_difference, wilson
 from robospa.results.statistics.significance import boschloo, mcnemar_mid_p, p_of_interval
@@ -55,6 +58,19 @@ def test_averages_weigh_categories_the_same_and_say_how_they_were_made(tmp_path:
     again = compare_results(*sides, method="bootstrap")
     assert group(again, "overall", 1).estimate.method == "stratified bootstrap"
     assert group(again, "overall", 1).p == group(found, "overall", 1).p  # not from a point
+
+
+def test_a_mean_that_ends_in_a_half_reads_alike_everywhere(tmp_path: Path) -> None:
+    """11.25, which is 11.249999999999998 as a sum of fractions."""
+    won = zip(load().members["GAC"], (0, 0, 2, 7), strict=True)
+    made = [r for task, n in won for r in outcomes(task, 1, [1] * n + [0] * (20 - n))]
+    run = write(tmp_path / "run", made)
+    (own,) = (r for r in score_table(run, run.scores()).rows if r.label.startswith("GAC Geom"))
+    table = summary_table([run_column(run)], "main", "sr", ("L1",))
+    (paper,) = (r for r in table.rows if r.label.startswith("Geom"))
+    found = compare_results(results_of_run(run), results_of_run(run))
+    assert {own.cells[0].text, paper.cells[0].text, found.table().rows[0].cells[1].text} == {"11.3"}
+    assert found.verdict.count("11.3") == 2
 
 
 def test_runs_on_other_seeds_are_not_paired(tmp_path: Path) -> None:
@@ -210,6 +226,14 @@ def test_other_step_limits_are_refused_but_not_against_the_paper(tmp_path: Path)
 def trials(mode: str, good: int) -> list[TrialRecord]:
     made = outcomes(SIZE, 1, [1] * good + [0] * (8 - good))
     return [replace(r, key=replace(r.key, mode=mode)) for r in made]
+
+
+def test_a_run_of_two_scene_modes_has_no_scores_as_a_whole(tmp_path: Path) -> None:
+    run = make_run(tmp_path / "run", [*trials("clean", 6), *trials("randomized", 3)])
+    for asked in (run.scores, run.comparable, run.grounding):
+        with pytest.raises(IncomparableError, match="mixes the scene modes clean and randomized"):
+            asked()
+    assert run.table().rows[0].kind == "section"
 
 
 @pytest.fixture
