@@ -49,10 +49,10 @@ def find_endpoint(url: str, options: Mapping[str, object] | None = None) -> Endp
     dialect = by_scheme.get(parts.scheme)
     if parts.scheme in REFUSED:
         raise ValueError(f"{shown!r}: {REFUSED[parts.scheme]}")
-    if "://" not in url:
-        raise ValueError(f"{shown!r} is no URL: of a server of robospa serve write ws://{shown}")
     if dialect is None:
-        raise ValueError(f"{shown!r} is no address of a policy server; {_addresses(by_scheme)}")
+        hint = f"; did you mean ws://{shown}?" if ":" in url and "://" not in url else ""
+        known = _addresses(by_scheme)
+        raise ValueError(f"{shown!r} is no address of a policy server; {known}{hint}")
     if not parts.hostname:
         raise ValueError(
             f"{shown!r} names no host: write for example {parts.scheme}://localhost:{dialect.port}"

@@ -70,7 +70,7 @@ REFUSED += [
     ]
 ]
 MISTYPED = [
-    ("check localhost:8000", "of a server of robospa serve write ws://localhost:8000"),
+    ("check localhost:8000", "did you mean ws://localhost:8000?"),
     ("compare a b --metric best", "'--metric': 'best' is not one of"),
     ("submit .", "--model"),
     ("check ws://127.0.0.1:9 --timeout -5", "-5 is not from 0.001 to 604800"),
