@@ -166,7 +166,7 @@ def _moved(step: Step, state: State) -> list[object]:
     if step.destination is not None:
         goal_now = state.objects[step.destination].now
         frames = steps.model(goal_now).frames
-        top = goal_now.place[2] + 2 * goal_now.half[2] - TABLE_TOP
+        top = goal_now.place[2] + 2 * goal_now.half[2] - steps.table_below(state.objects)
         up = 0.0
         if item.now.kind == "bowl" == goal_now.kind:
             up = frames["nest"].position[2] - frames["support"].position[2]
@@ -195,8 +195,9 @@ def furnished(seen: Sequence[Seen]) -> list[Seen]:
     if not shown or any(one.half[0] > memory.SHOWN_X for one in seen):
         return list(seen)
     made = memory.BLOCKS_STAND.params
-    half, y = made["half"], float(np.median([one.place[1] for one in shown]))
-    stand = Seen("block", (0.0, y, memory.STAND_TOP - 2 * half[2]), half, 0.0, made["color"])
+    half = made["half"]
+    y, top = (float(np.median([one.place[i] for one in shown])) for i in (1, 2))
+    stand = Seen("block", (0.0, y, top - 2 * half[2]), half, 0.0, made["color"])
     parts = [o for o in seen if o.kind == "block" and o.place[1] > y - half[1] and o not in shown]
     return [stand, *(one for one in seen if one not in parts)]
 
@@ -232,7 +233,8 @@ class Belief:
             for i, o in enumerate(self.state.objects)
             if imagined(o)
         )
-        return Scene("imagined", 1, 0, self.robot.name, "clean", items, {})
+        rise = steps.table_below(self.state.objects) - TABLE_TOP
+        return Scene("imagined", 1, 0, self.robot.name, "clean", items, {}, table_rise=rise)
 
     def snapshot(self, observation: Observation, scene: Scene) -> Snapshot:
         """This instant, as imagined."""

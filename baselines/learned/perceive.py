@@ -13,6 +13,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from robospa.baselines.learned.scenes import middle_pixel
-from robospa.baselines.learned.steps import KINDS, Seen, model, seen_at
+from robospa.baselines.learned.steps import KINDS, Seen, model, seen_at, table_top
 from robospa.harness.running.atomic_file import replace_file
 from robospa.tasks.families.dustbin import BIN
 from robospa.tasks.objects import object_model
@@ -44,6 +45,8 @@ NUMBERS = 16
 """Of a measurement: place 3, half sizes 3, turn 6, colour 3, hinge 1."""
 SQUARE = 1.08
 """How much longer than wide what is about square may seem."""
+EDGE = 8
+"""In so many of the uppermost rows of cells the far edge of the table is seen."""
 NEAR, UNIT = 0.03, 0.02
 """The height above the table [m] in which a pixel is looked up, and the unit of offsets [m]."""
 
@@ -56,21 +59,23 @@ def block_of(inner: int, outer: int, stride: int = 1, dilation: int = 1) -> nn.S
 
 class FindNetwork(nn.Module):
     """Pictures (B, 3, H, W), -0.5 to 0.5, to (B, 3, H / CELL, W / CELL): how likely a middle lies
-    in each cell, as a logit, and where from the cell's middle [cells]."""
+    in each cell, as a logit, and where from the cell's middle [cells]; and to how much higher than
+    usual the table is (B,) [UNIT], by where its far edge is seen."""
 
     def __init__(self, width: int = 48) -> None:
         super().__init__()
         self.first = nn.Sequential(nn.Conv2d(3, 24, 4, 4), nn.ReLU(), block_of(24, width, 2))
         self.deep = nn.ModuleList([block_of(width, width, 1, d) for d in (1, 2, 4, 2)])
         self.last = nn.Conv2d(width, 3, 1)
+        self.rise = nn.Sequential(nn.Linear(EDGE * width, 64), nn.ReLU(), nn.Linear(64, 1))
 
-    def forward(self, images: Tensor) -> Tensor:
+    def forward(self, images: Tensor) -> tuple[Tensor, Tensor]:
         """See above."""
         x = self.first(images)
         for layer in self.deep:
             x = x + layer(x)
-        out: Tensor = self.last(x)
-        return out
+        edge = x[:, :, :EDGE].mean(dim=3).flatten(1)
+        return self.last(x), self.rise(edge)[:, 0]
 
 
 class MeasureNetwork(nn.Module):
@@ -178,6 +183,18 @@ def seen_of(numbers: NDArray[np.float64], pixels: NDArray[np.float64]) -> list[S
     return found
 
 
+def standing(seen: Sequence[Seen], top: float) -> list[Seen]:
+    """What is seen, moved along the rays of its middles until its table is at height `top` [m]:
+    how far away a thing is, is hardly seen, but they all stand on one table."""
+    too_low = top - table_top([one.place[2] for one in seen])
+    eye, moved = np.array(WORKCELL.head.position), []
+    for one in seen:
+        ray = np.array(one.place) + np.array([0.0, 0.0, one.half[2]]) - eye
+        x, y, z = (np.array(one.place) + ray * (too_low / ray[2])).tolist()
+        moved.append(one if one.kind == "dustbin" else replace(one, place=(x, y, z)))
+    return moved
+
+
 def find_losses(
     network: FindNetwork,
     images: Sequence[NDArray[np.uint8]],
@@ -187,7 +204,7 @@ def find_losses(
     """Of finding the middles of what is `seen` in pictures; `quick` is less exact."""
     inputs = as_input(np.stack(images)).contiguous(memory_format=torch.channels_last)
     with torch.autocast("cpu", torch.bfloat16, quick):
-        told = network(inputs)
+        told, rises = network(inputs)
     told = told.float()
     rows, columns = told.shape[2:]
     cells = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=2) + 0.5
@@ -203,7 +220,9 @@ def find_losses(
     count = target[:, 0].sum().clamp(min=1)
     found = F.binary_cross_entropy_with_logits(told[:, 0], target[:, 0], reduction="sum") / count
     away = (F.smooth_l1_loss(told[:, 1:], target[:, 1:], reduction="none", beta=0.1) * mask).sum()
-    return {"found": found, "away": away / mask.sum().clamp(min=1)}
+    heights = [(table_top(items[:, 3]) - TABLE_TOP) / UNIT for items in seen]
+    rise = F.smooth_l1_loss(rises.float(), torch.tensor(heights), beta=0.1)
+    return {"found": found, "away": away / mask.sum().clamp(min=1), "rise": rise}
 
 
 def measure_losses(
@@ -265,13 +284,15 @@ class Perceiver:
         with torch.inference_mode():
             shifted = [np.pad(image, ((n, 0), (n, 0), (0, 0)), "edge") for n in SHIFTS]
             views = np.stack([one[: image.shape[0], : image.shape[1]] for one in shifted])
-            pixels = middles(self._find(as_input(views)).double().numpy())
+            found, rises = self._find(as_input(views))
+            pixels = middles(found.double().numpy())
             if not len(pixels):
                 return []
             near = pixels.round().clip(0, [WIDTH - 1, HEIGHT - 1]).astype(np.int64)
             crops = as_input(around(image, near))
             told = self._measure(crops, torch.from_numpy(near.astype(np.float32)))
-        return seen_of(told.double().numpy(), near.astype(np.float64))
+        seen = seen_of(told.double().numpy(), near.astype(np.float64))
+        return standing(seen, TABLE_TOP + UNIT * float(rises[0]))
 
 
 def middles(told: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from robospa.action_space import ARMS
 from robospa.baselines.learned import steps
-from robospa.baselines.learned.steps import KINDS, TYPES, Seen, State, Step
+from robospa.baselines.learned.steps import KINDS, TYPES, Seen, State, Step, Tracked
 from robospa.geometry import Pose, yaw_rotation
 from robospa.harness.robots import embodiment
 from robospa.harness.running.atomic_file import replace_file
@@ -46,8 +46,8 @@ the last step."""
 NOTHING = -1
 TOLD = 24
 """Sentences kept of a scene."""
-RANDOMISED = 4
-"""Of so many pictures one shows a randomised scene."""
+RANDOMISED = (2, 3)
+"""Which of four blocks are randomised scenes."""
 LARGE = Limits(message=2**30, items=10**7)
 """Of a file of pictures."""
 UNDRAWN = ("dock", "hang", "pour", "hit", "pick")
@@ -107,9 +107,22 @@ def lesson(scene: Scene) -> Lesson:
     last = [(len(s.done), TYPES.index(s.done[-1].type) if s.done else NOTHING) for s, _ in pairs]
     every = sentences(scene, "train")
     told = tuple(every[int(i)] for i in rng.permutation(len(every))[:TOLD])
-    tokens = [tokens_of(state) for state, _ in pairs]
+    clutter = lying_about(scene)
+    tokens = [tokens_of(among(state, clutter)) for state, _ in pairs]
     where = variants().index((scene.task, scene.level))
     return Lesson(tokens, answers, np.array(last, np.int16), told, where)
+
+
+def lying_about(scene: Scene) -> tuple[Tracked, ...]:
+    """The clutter that the head camera shows; nothing is done with it."""
+    every = [steps.seen_at(o.asset, model_of(o), o.pose) for o in scene.clutter if o.asset in KINDS]
+    return tuple(Tracked(one, one) for one in every if steps.in_picture(one))
+
+
+def among(state: State, clutter: tuple[Tracked, ...]) -> State:
+    """The state with clutter behind its objects, of which a wall may hide some."""
+    every = steps.hidden(replace(state, objects=state.objects + clutter)).objects
+    return replace(state, objects=state.objects + every[len(state.objects) :])
 
 
 def _answer(step: Step, refers: int | None) -> tuple[float, ...]:
@@ -174,8 +187,7 @@ def picture(scene: Scene, state: State) -> Picture:
     poses |= {o.name: o.pose for o in scene.clutter}
     renderer.sync(scene, embodiment(scene.embodiment))
     image = renderer.render([CameraSpec("head", WIDTH, HEIGHT)], links, poses, hinges)[0]
-    lies = [steps.seen_at(o.asset, model_of(o), o.pose) for o in scene.clutter if o.asset in KINDS]
-    shown = [*(o.now for o in state.objects if o.visible), *lies]
+    shown = [o.now for o in among(state, lying_about(scene)).objects if o.visible]
     rows = [seen_numbers(s) for s in shown if steps.in_picture(s)]
     packed = BytesIO()
     Image.fromarray(image).save(packed, "PNG", compress_level=1)
@@ -198,12 +210,15 @@ def drawable(pairs: Sequence[tuple[State, Step]]) -> list[State]:
     return [s for s, _ in pairs if not any(step.type in UNDRAWN for step in s.done)]
 
 
+def mode_of(block: int) -> str:
+    """The mode of the scenes of a block."""
+    return "randomized-seen" if block % 4 in RANDOMISED else "clean"
+
+
 def pictures(block: int, first: int = FIRST_TRAINING_SEED) -> Iterator[Picture]:
-    """One picture of every variant: of the start, or of a later state of the plan; of a randomised
-    scene for one in RANDOMISED of the blocks."""
-    mode = "randomized-seen" if block % RANDOMISED == RANDOMISED - 1 else "clean"
+    """One picture of every variant: of the start, or of a later state of the plan."""
     rng = np.random.default_rng([first, block])
-    for scene in scenes(block, first, mode):
+    for scene in scenes(block, first, mode_of(block)):
         states = drawable(steps.labelled(scene))
         later = len(states) > 1 and rng.random() < 0.5
         yield picture(scene, states[int(rng.integers(1, len(states))) if later else 0])

@@ -6,7 +6,7 @@ of objects that were seen, so that acting knows what to expect.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -34,6 +34,8 @@ HELD, OPENED, SAME_PLACE = 0.12, 0.7, 0.012
 near [m] as that to where it stood at first is brought back."""
 MIDDLE = (0.0, 0.0, 1.0)
 """Of a box, in halves of it from the middle of its underside."""
+SUNK = 0.06
+"""No table is so much lower [m] than usual."""
 WIDE = 0.08
 """What is as wide [m] carries others."""
 
@@ -270,6 +272,17 @@ def _at(kind: str, now: Seen, goal: Seen) -> Seen:
     return replace(now, place=(x, y, goal.place[2] if kind == "drop" else top))
 
 
+def table_top(heights: Iterable[float]) -> float:
+    """Height [m] of the table, by those of the undersides of things, most of which stand on it."""
+    low = [z for z in heights if abs(z - TABLE_TOP) < SUNK]
+    return float(np.median(low)) if low else TABLE_TOP
+
+
+def table_below(items: Sequence[Tracked]) -> float:
+    """Height [m] of the table, by how its objects were first seen."""
+    return table_top(item.first.place[2] for item in items)
+
+
 def support_height(items: Sequence[Tracked], place: tuple[float, float], but: Seen) -> float:
     """Height [m] of what lies at x and y: the table, or where a wide thing carries others."""
     tops = [
@@ -277,7 +290,7 @@ def support_height(items: Sequence[Tracked], place: tuple[float, float], but: Se
         for o in items
         if o.now is not but and min(o.now.half[:2]) > 0.04 and _covers(o.now, place)
     ]
-    return max([z for z in tops if z < TABLE_TOP + 0.1], default=TABLE_TOP)
+    return max([z for z in tops if z < TABLE_TOP + 0.1], default=table_below(items))
 
 
 def taken(state: State, but: int, room: float = 0.0) -> list[tuple[tuple[float, float], float]]:

@@ -52,10 +52,10 @@ class TrainOptions:
     """How much is made and learned."""
 
     blocks: Count = option(120, "lessons of so many scenes of each variant")
-    pictures: Count = option(25, "so many pictures of each variant")
-    point: Count = option(30_000, "steps of what chooses the next step")
-    find: Count = option(4_600, "steps of what finds objects in pictures")
-    measure: Count = option(5_200, "steps of what measures them")
+    pictures: Count = option(50, "so many pictures of each variant")
+    point: Count = option(36_000, "steps of what chooses the next step")
+    find: Count = option(14_000, "steps of what finds objects in pictures")
+    measure: Count = option(12_000, "steps of what measures them")
     seed: int = option(0, "seed of weights and batches")
 
 
@@ -262,7 +262,8 @@ def _worker(argument: tuple[Path, TrainOptions]) -> Callable[[str], None]:
 
 
 def _point(out: Path, options: TrainOptions) -> None:
-    lessons = [lesson(scene) for n in range(options.blocks) for scene in scenes.scenes(n)]
+    blocks = (scenes.scenes(n, mode=scenes.mode_of(n)) for n in range(options.blocks))
+    lessons = [lesson(scene) for block in blocks for scene in block]
     told = (sentence for item in lessons for sentence in item.told)
     words = point.vocabulary_of(chain(told, *paraphrases().values()), 2)
     vocabulary = Vocabulary(words)

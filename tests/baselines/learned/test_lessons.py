@@ -1,5 +1,6 @@
 """Lessons and pictures: made from training seeds, kept in files, the same each time."""
 
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
@@ -51,6 +52,14 @@ def test_what_cannot_be_seen_has_no_numbers() -> None:
     for item, row in zip(state.objects, tokens, strict=True):
         assert row[:SEEN_WIDTH].any() == item.visible
     assert not all(item.visible for item in state.objects)
+
+
+def test_clutter_is_seen_and_nothing_is_done_with_it() -> None:
+    scene = build_scene("Remember_Color_Cover", 3, FIRST_TRAINING_SEED, mode="randomized-seen")
+    made, plain = lesson(scene), lesson(replace(scene, clutter=()))
+    for tokens, others, answers in zip(made.tokens, plain.tokens, made.answers, strict=True):
+        assert len(tokens) > len(others) > answers[:, [1, 2]].max()
+        np.testing.assert_array_equal(tokens[: len(others)], others)
 
 
 def test_states_with_something_in_a_hand_are_not_drawn() -> None:

@@ -1,6 +1,7 @@
 """Pictures to objects: what is labelled, cut out, found and told."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from robospa.baselines.learned import perceive, scenes  # noqa: E402
-from robospa.baselines.learned.steps import KINDS, Seen  # noqa: E402
+from robospa.baselines.learned.steps import KINDS, Seen, pixel  # noqa: E402
 from robospa.workcell import WORKCELL  # noqa: E402
 
 MUG = Seen("mug", (0.1, -0.05, 0.74), (0.05, 0.04, 0.05), 0.7, (0.1, 0.2, 0.3))
@@ -52,6 +53,16 @@ def test_a_block_is_labelled_along_its_longer_side() -> None:
     made = perceive.plain(rows(BAR))[0]
     assert made[4:6] == pytest.approx((0.03, 0.01))
     assert made[7] == pytest.approx(0.2 + math.pi / 2 - math.pi)
+
+
+def test_what_is_seen_on_a_lower_table_is_where_it_was_seen() -> None:
+    pile, bin_seen = replace(CUBE, place=(-0.2, 0.1, 0.78)), replace(MUG, kind="dustbin")
+    seen = [MUG, CUBE, pile, replace(BAR, place=(0.1, 0.1, 0.742)), bin_seen]
+    *moved, same = perceive.standing(seen, 0.715)
+    assert same == bin_seen
+    for old, new in zip(seen, moved, strict=False):
+        assert pixel(new) == pytest.approx(pixel(old))
+        assert new.place[2] - old.place[2] == pytest.approx(-0.025, abs=0.002)
 
 
 def test_what_lies_around_the_picture_is_its_edge() -> None:
