@@ -54,5 +54,5 @@ def test_axes_are_named_one_by_one_in_groups_or_all() -> None:
     assert "latency" not in dict(axes("all")) and "repeat" in dict(axes("all"))
     with pytest.raises(ValueError, match="did you mean blur"):
         axes("blurr")
-    with pytest.raises(ValueError, match="no part ''"):
+    with pytest.raises(ValueError, match="no part or axis ''"):
         axes("blur,")  # not "repeat", the one axis of no group
