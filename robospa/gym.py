@@ -3,9 +3,9 @@
     import gymnasium
     import robospa.gym
 
-    env = gymnasium.make("RoboSPA/Pick_Blocks_Size-v2", level=3)
+    env = gymnasium.make("RoboSPA/Pick_Blocks_Size-v3", level=3)
 
-`gymnasium.make("robospa.gym:RoboSPA/Pick_Blocks_Size-v2")` imports this module by itself. It needs
+`gymnasium.make("robospa.gym:RoboSPA/Pick_Blocks_Size-v3")` imports this module by itself. It needs
 the extras `gym` and `sim`.
 """
 

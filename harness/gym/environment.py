@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
+from operator import index
 from typing import Any
 
 import gymnasium
@@ -23,7 +24,7 @@ from robospa.harness.robots import embodiment as robot_named
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.robots.kinematics import chain_of
 from robospa.harness.seeds.lists import find_list
-from robospa.harness.settings import SettingsError
+from robospa.harness.settings import Selection, SettingsError, Simulation
 from robospa.harness.trial import (
     TrialState,
     open_trial,
@@ -33,8 +34,8 @@ from robospa.harness.trial import (
 )
 from robospa.harness.world import ActionError, World
 from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS, open_world
-from robospa.observation import CAMERAS, DEFAULT_CAMERAS, WIDTH, CameraSpec
-from robospa.protocol.errors import PolicyError
+from robospa.observation import DEFAULT_CAMERAS, WIDTH, CameraSpec
+from robospa.protocol.errors import DecodeError, PolicyError
 from robospa.protocol.policy import PolicySpec
 from robospa.results.records.trial_record import TrialRecord
 from robospa.tasks.catalog import task as find_task
@@ -89,13 +90,18 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         found = find_task(task)
         if level not in found.levels:
             raise SettingsError(f"{found.name} has levels {sorted(found.levels)}, not {level}")
+        level = int(level)  # equal numbers of other types would be other scenes
         if render_mode not in (None, "rgb_array"):
             raise SettingsError(f"render_mode {render_mode!r} is not rgb_array or None")
-        if wrong := [name for name in (*cameras, render_camera) if name not in CAMERAS]:
-            raise SettingsError(f"there is no camera {wrong[0]!r}; known are {', '.join(CAMERAS)}")
+        if seeds is not None and (not len(seeds) or min(seeds) < 0):
+            raise SettingsError("seeds are one or more whole numbers from 0 up")
+        Selection(split=split)
+        Simulation(control=control, step_scale=step_scale)
+        self._camera = CameraSpec(render_camera, *map(index, render_size))
+        check_spec(PolicySpec("render", cameras=(self._camera,)))
         self.spec_of_policy = spec or PolicySpec(
             "gymnasium",
-            cameras=tuple(CameraSpec(name, *size) for name in cameras),
+            cameras=tuple(CameraSpec(name, *map(index, size)) for name in cameras),
             state=state,
             action=action,
         )
@@ -111,7 +117,6 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._world_kind = world
         self._world_arguments = {"control": control} if world == SAPIEN_NAME else {}
         self._parts = load_function(parts)
-        self._camera = CameraSpec(render_camera, *render_size)
         # What simulates is opened at the first reset: a vector's parent only looks at the spaces.
         self._world: World | None = None
         self._trial: TrialState | None = None
@@ -127,9 +132,9 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         is none to draw from.
         """
         super().reset(seed=seed)
-        self._key = replace(self._key, seed=self._draw() if seed is None else int(seed))
-        self._record = None
+        self._trial = self._record = None  # so they stay if this seed has no scene
         self._told = 0
+        self._key = replace(self._key, seed=self._draw() if seed is None else int(seed))
         setup = self._parts(self._key)
         self._trial = open_trial(self._opened(), self._key, setup)
         if self._trial.start():
@@ -284,7 +289,11 @@ Bounds = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 
 def check_spec(spec: PolicySpec) -> None:
-    """SettingsError for what an environment cannot give."""
+    """SettingsError for what an environment cannot give, and what no policy may ask for."""
+    try:
+        PolicySpec.from_json(spec.to_json())
+    except DecodeError as error:
+        raise SettingsError(str(error)) from None
     if spec.history:
         raise SettingsError(
             "an environment gives no history: stack its observations with Gymnasium's wrappers"

@@ -14,6 +14,7 @@ import robospa.gym  # noqa: E402, F401
 from robospa.harness.gym.environment import TaskEnv, env_id  # noqa: E402
 from robospa.harness.settings import SettingsError  # noqa: E402
 from robospa.harness.trial import run_trial  # noqa: E402
+from robospa.harness.world import SceneUnstable  # noqa: E402
 from robospa.protocol.policy import PolicySpec  # noqa: E402
 from robospa.tasks.catalog import tasks  # noqa: E402
 from robospa.trial import TrialKey  # noqa: E402
@@ -111,7 +112,15 @@ def test_spaces_are_those_of_the_spec() -> None:
     ("given", "reason"),
     [
         ({"level": 6}, r"has levels \[1, 2, 3, 4, 5\], not 6"),
-        ({"cameras": ["top"]}, "there is no camera 'top'"),
+        ({"cameras": ["top"]}, "must be one of head, .*, not 'top'"),
+        ({"cameras": ["head", "head"]}, "names a camera twice"),
+        ({"render_camera": "top"}, "must be one of head, .*, not 'top'"),
+        ({"size": (0, 240)}, "width' must be a whole number >= 1, not 0"),
+        ({"render_size": (0, 0)}, "width' must be a whole number >= 1, not 0"),
+        ({"state": "measure"}, "'state' must be one of commanded, measured, none"),
+        ({"split": "test"}, "split 'test' is not one of heldout"),
+        ({"step_scale": 0.0}, "step_scale is 0.0, and must be more than 0"),
+        ({"seeds": []}, "one or more whole numbers"),
         ({"spec": PolicySpec("x", history=(-1,))}, "gives no history"),
         ({"spec": PolicySpec("x", privileged=True)}, "gives no privileged state"),
         ({"render_mode": "human"}, "not rgb_array or None"),
@@ -120,6 +129,24 @@ def test_spaces_are_those_of_the_spec() -> None:
 def test_what_cannot_be_is_refused(given: dict[str, Any], reason: str) -> None:
     with pytest.raises(SettingsError, match=reason):
         TaskEnv("Pick_Blocks_Size", **given)
+
+
+def test_a_level_of_another_type_is_the_same_scene() -> None:
+    env = fake(level=np.float64(3)).unwrapped
+    assert env.key == TrialKey("Pick_Blocks_Size", 3, 0) and type(env.key.level) is int
+
+
+def test_a_reset_that_fails_leaves_no_trial_to_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unstable(*_: object) -> None:
+        raise SceneUnstable("it does not come to rest")
+
+    env = fake().unwrapped
+    env.reset(seed=100003)
+    monkeypatch.setattr(FakeWorld, "load", unstable)
+    with pytest.raises(SceneUnstable):
+        env.reset(seed=100001)
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step(ONES)
 
 
 def test_a_picture_is_drawn_on_request() -> None:
