@@ -14,7 +14,7 @@ import numpy as np
 from robospa.action_space import ActionSpace
 from robospa.geometry import Array
 from robospa.harness.convention_check.action_faults import AnswerSample
-from robospa.harness.convention_check.check import judge
+from robospa.harness.convention_check.check import FITS, judge
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.observation import Observation
@@ -139,7 +139,7 @@ def odd(cases: Sequence[AnswerSample], action: str = "joint") -> tuple[list[str]
         grip = np.abs(given - recorded)[:, space.grippers].mean()
         best = findings.best
         shrunk = best is not None and len(SHRINKS & {*best.names}) > 1
-        if best is not None and not shrunk and (far or grip > TURNED or findings.base.score > 3):
+        if best is not None and not shrunk and (far or grip > TURNED or findings.base.score > FITS):
             found.append(f"the first action is far from the state; it looks as if {best.phrase}")
             far = False
     if far:
