@@ -295,7 +295,7 @@ def details(status: Status) -> list[str]:
 
 def summary(shares: Mapping[str, float], status: Status) -> list[str]:
     """The same about a whole run, for its end."""
-    lines = [f"time: {shares_text(shares)}, with {status.workers} workers on {status.cores} cores"]
+    lines = [f"time: {shares_text(shares)}, with {status.crowd}"]
     used = [s for s in _busiest(status.servers) if s.trials]
     for one in used:
         trials = f"{counted(one.trials, 'trial')}, " if len(used) > 1 else ""

@@ -22,7 +22,7 @@ from tempfile import TemporaryDirectory
 from urllib.parse import unquote
 
 from robospa.results.figures.series import DrawnFigure
-from robospa.results.records.manifest import MANIFEST, RunError
+from robospa.results.records.manifest import MANIFEST, RunError, no_run
 from robospa.results.records.runs import TRIALS, VIDEOS, Run, read_run
 from robospa.results.report.page import FIGURES, page
 from robospa.results.report.report import draw_figures, make_report
@@ -107,7 +107,7 @@ class LiveReport:
                 continue
             found.append((path.name, status.st_size, status.st_mtime_ns))
         if not found:
-            raise RunError(f"{self.folder} is not a run: it has no {MANIFEST}")
+            raise no_run(self.folder)
         return tuple(found)
 
     def _make(self, run: Run) -> str:

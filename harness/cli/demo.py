@@ -7,6 +7,7 @@ scenes, and one page of both.
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -69,7 +70,10 @@ def demo(
     _film([read_run(each) for each in folders.values()], films)
     report = make_report([read_run(each) for each in folders.values()])
     page = write_report(report, folder / "report") / "report.html"
-    print(f"\nDone in {time.monotonic() - started:.0f} s. Open {page} in a browser.")
+    print(f"\nDone in {time.monotonic() - started:.0f} s. Both runs are on one page:")
+    print(f"    python3 -m webbrowser {page.resolve().as_uri()}")
+    if shutil.which("robospa") is None:
+        print(f"    source {Path(sys.prefix) / 'bin' / 'activate'}   # then `robospa` is a command")
 
 
 def _select(names: Sequence[str], levels: str, trials: int) -> Selection:

@@ -15,6 +15,7 @@ from pathlib import Path
 from robospa.harness.factory import is_url
 from robospa.harness.running.executor import Fault
 from robospa.results.records.trial_record import PROCESSOR, TrialRecord
+from robospa.text import counted
 
 RECENT = 200
 """Trials whose shares of time are shown while a run goes on."""
@@ -137,9 +138,14 @@ class Status:
         return f"first trials under way, {answers} answers of the policy so far"
 
     @property
+    def crowd(self) -> str:
+        """`8 workers on 4 cores`."""
+        return f"{counted(self.workers, 'worker')} on {counted(self.cores, 'core')}"
+
+    @property
     def workers_text(self) -> str:
         """`8 workers on 4 cores`, and how many of them are starting or idle."""
-        text = f"{self.workers} workers on {self.cores} cores"
+        text = self.crowd
         if self.starting:
             return f"{text}, {self.starting} starting"
         idle = self.workers - self.running

@@ -342,11 +342,19 @@ def manifest_text(manifest: RunManifest) -> str:
     return json.dumps(manifest.to_json(), indent=1, default=str)
 
 
+def no_run(folder: Path) -> RunError:
+    """That `folder` is none, with the runs in it or one folder deeper, the newest first."""
+    found = [*folder.glob(f"*/{MANIFEST}"), *folder.glob(f"*/*/{MANIFEST}")]
+    inside = [str(path.parent) for path in sorted(found, key=lambda p: -p.stat().st_mtime)]
+    shown = f"; runs in it are {', '.join(inside[:3])}{', ...' * (len(inside) > 3)}"
+    return RunError(f"{folder} is not a run: it has no {MANIFEST}{shown if inside else ''}")
+
+
 def read_manifest(folder: Path) -> RunManifest:
     """The run's `run.json`; raises RunError if there is none or it is broken."""
     path = folder / MANIFEST
     if not path.exists():
-        raise RunError(f"{folder} is not a run: it has no {MANIFEST}")
+        raise no_run(folder)
     try:
         data = parse_json(read_bytes(path, MAX_MANIFEST_BYTES).decode())
     except ValueError as error:

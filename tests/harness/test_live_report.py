@@ -152,5 +152,9 @@ def test_records_that_contradict_each_other_are_reported(run: Path, server: Repo
 
 
 def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RunError, match="is not a run"):
+    with pytest.raises(RunError, match=r"is not a run: it has no run\.json$"):
+        LiveReport(tmp_path)
+    (tmp_path / "demo" / "mistakes").mkdir(parents=True)
+    (tmp_path / "demo" / "mistakes" / "run.json").touch()
+    with pytest.raises(RunError, match=r"runs in it are .*demo/mistakes$"):
         LiveReport(tmp_path)

@@ -19,5 +19,6 @@ def test_the_demo_leaves_a_page_of_mistakes_and_expert_with_films(tmp_path: Path
     assert done.code == 0 and "Pick Blocks Size" in done.out
     report = tmp_path / "demo" / "report"
     assert len(list((report / "videos").rglob("*.mp4"))) == 2
+    assert f"python3 -m webbrowser {(report / 'report.html').as_uri()}\n" in done.out
     page = (report / "report.html").read_text()
     assert "<video" in page and "mistakes" in page and "oracle" in page
