@@ -66,16 +66,19 @@ def evaluate(
     given = {name: value for name, value in named.items() if value is not None}
     asked = updated(_base(config), {**given, **settings})
     going = goes_on(resume, asked.out)
+    mapped = settings.get("policy_map")
     if policy is None or isinstance(policy, str | Sequence):
         if policy is not None:
-            asked = updated(asked, {"policy": policy, "policy_map": settings.get("policy_map")})
-        elif settings.get("policy_map") is not None:
+            asked = updated(asked, {"policy": policy, "policy_map": mapped})
+        elif mapped is not None:
             asked = replace(asked, policy=())
         request = make_request(asked, token=token, resume=going)
         run_request(request)
         return load_run(request.config.folder)
     if token is not None:
         raise SettingsError("token goes with policy servers, and this policy is in this process")
+    if mapped is not None:
+        raise SettingsError("give the policy or policy_map, not both")
     instance, factory = _object_or_factory(policy)
     asked = _for_one_process(policy, instance, asked, going)
     secret = secrets.token_urlsafe()

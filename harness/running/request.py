@@ -135,7 +135,7 @@ def run_folder(settings: EvaluationSettings, resume: bool = False) -> Path:
     if resume:
         raise SettingsError("to resume a run, say with out which one")
     first = settings.policy[0] if settings.policy else (settings.policy_map or Path()).stem
-    name = first.rpartition("/")[2] if is_url(first) else first
+    name = first.partition("?")[0].rstrip("/").rpartition("/")[2] if is_url(first) else first
     safe = "".join(c if c.isalnum() else "-" for c in name)[:80]
     return new_folder(safe)
 

@@ -98,6 +98,7 @@ def test_a_module_and_class_and_its_settings_again(tmp_path: Path) -> None:
         ("hold", {"video": "some"}, "not one of none, failures, first, all"),
         (None, {}, "or else --policy-map"),
         ("hold", {"policy_map": "map.json"}, "not both"),
+        (FakePolicy, {"policy_map": "map.json"}, "not both"),
     ],
 )
 def test_what_cannot_be_is_refused_before_anything_is_written(

@@ -88,6 +88,7 @@ def test_servers_that_do_not_go_together_are_refused(policy: tuple[str, ...], re
 def test_the_default_folder_is_named_after_the_policy() -> None:
     folder = run_folder(settings("ws://host:8000"))
     assert folder.name.startswith("host-8000-")
+    assert run_folder(settings("ws://host:8000/")).name.startswith("host-8000-")
     assert run_folder(settings("ws://host:8000")) != folder, "two runs that start in one second"
     with pytest.raises(SettingsError, match="say with out which one"):
         run_folder(settings("hold"), resume=True)
