@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 from xdist.scheduler import LoadFileScheduling
 
+from robospa.harness.running.status import cores
 from robospa.tasks import catalog
 
 TASKS = re.compile("|".join(sorted(catalog.tasks(), key=len, reverse=True)), re.IGNORECASE)
@@ -69,8 +70,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     """One more than cores, as some tests wait for deadlines; those of the simulator never do."""
-    cores = len(os.sched_getaffinity(0))
-    return cores if config.getoption("markexpr") == "sim" else cores + 1
+    return cores() if config.getoption("markexpr") == "sim" else cores() + 1
 
 
 class ByTask(LoadFileScheduling):  # type: ignore[misc]

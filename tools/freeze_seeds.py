@@ -18,7 +18,6 @@ from __future__ import annotations
 import argparse
 import csv
 import io
-import os
 import re
 import time
 from collections import Counter
@@ -26,6 +25,7 @@ from pathlib import Path
 
 from robospa.harness.robots import embodiments
 from robospa.harness.running.atomic_file import replace_file
+from robospa.harness.running.status import cores
 from robospa.harness.seeds.attempt import Evidence
 from robospa.harness.seeds.lists import inputs, read_levels, save
 from robospa.harness.seeds.sweep import Search, searches, sweep_with_bar
@@ -85,7 +85,7 @@ def main() -> None:
     parser.add_argument("--robots", help="such as piper,ur5-wsg; else all")
     parser.add_argument("--modes", help="clean or randomized; else both")
     parser.add_argument("--minutes", type=float, help="go on with no further list after so long")
-    parser.add_argument("--workers", type=int, default=len(os.sched_getaffinity(0)))
+    parser.add_argument("--workers", type=int, default=cores())
     options = parser.parse_args()
     robots, modes = (text and text.split(",") for text in (options.robots, options.modes))
     keys = [

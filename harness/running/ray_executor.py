@@ -41,6 +41,7 @@ from robospa.harness.running.executor import (
 )
 from robospa.harness.running.manifest import package_versions
 from robospa.harness.running.record_store import RecordWriter
+from robospa.harness.running.status import cores
 from robospa.harness.running.worker import LocalExecutor, WorkerConfig
 from robospa.harness.settings import Compute
 from robospa.results.records.runs import ACTIONS
@@ -361,7 +362,7 @@ def join_cluster(address: str | None) -> Any:
     options: dict[str, Any] = {"log_to_driver": False, "configure_logging": False}
     if address == "local":
         options.update(
-            num_cpus=len(os.sched_getaffinity(0)),
+            num_cpus=cores(),
             include_dashboard=False,
             object_store_memory=128 * 2**20,
             _node_ip_address="127.0.0.1",

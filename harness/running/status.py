@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -346,19 +346,42 @@ NOTABLE, MOSTLY = 0.1, 0.5
 it is so even where the cores are full."""
 
 
-def cores() -> int:
-    """Processor cores that this process may use."""
-    return len(os.sched_getaffinity(0))
+def cores(root: Path = Path("/")) -> int:
+    """Processor cores that this process may use: those that it is bound to, within the limit of its
+    container, whole ones, but at least one. What the kernel says is read below `root`."""
+    files = ("cpu.cfs_quota_us", "cpu.cfs_period_us"), ("cpu.max",)
+    limits = [quota // period for quota, period in _limits(root, "cpu", *files)]
+    return max(1, min([len(os.sched_getaffinity(0)), *limits]))
 
 
-def most_workers() -> int:
+def most_workers(root: Path = Path("/")) -> int:
     """What cores and free memory allow; at least one per core."""
+    lines = _text(root / "proc/meminfo").splitlines()
+    free = [int(x.split()[1]) * 1024 for x in lines if x.startswith("MemAvailable:")] or [0]
+    limits = _limits(root, "memory", ("memory.limit_in_bytes",), ("memory.max",))
+    least = min(free + [limit for (limit,) in limits])
+    return max(cores(root), min(PER_CORE * cores(root), int(least / MEMORY)))
+
+
+def _limits(root: Path, kind: str, *files: tuple[str, ...]) -> Iterator[list[int]]:
+    """The numbers in `files`, named for versions 1 and 2, of this process's control group and of
+    all above it, whose limits hold for it too; of those that have a limit."""
+    for line in _text(root / "proc/self/cgroup").splitlines():
+        _, kinds, group = line.split(":", 2)
+        if not kinds or kind in kinds.split(","):
+            top, inner = root / "sys/fs/cgroup" / (kind if kinds else ""), Path(group.strip("/"))
+            for place in (inner, *inner.parents):
+                texts = (_text(top / place / name) for name in files[not kinds])
+                words = " ".join(texts).split()
+                if words and all(word.isdecimal() for word in words):
+                    yield list(map(int, words))
+
+
+def _text(path: Path) -> str:
     try:
-        lines = Path("/proc/meminfo").read_text().splitlines()
-        free = next(int(x.split()[1]) * 1024 for x in lines if x.startswith("MemAvailable:"))
-    except (OSError, StopIteration, ValueError):
-        return cores()
-    return max(cores(), min(PER_CORE * cores(), int(free / MEMORY)))
+        return path.read_text()
+    except OSError:
+        return ""
 
 
 @dataclass

@@ -15,10 +15,13 @@ from run_fakes import FAKES
 import robospa
 from robospa.extras import MissingPackage
 from robospa.harness.running.status import (
+    MEMORY,
+    PER_CORE,
     Autoscaler,
     ServerStats,
     Status,
     TimeBreakdown,
+    cores,
     most_workers,
     server_text,
     shares_text,
@@ -226,14 +229,36 @@ def test_a_review_takes_a_whole_round() -> None:
     assert scaler.scale_up(saturated=False) > 0
 
 
-def test_memory_and_cores_bound_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robospa.harness.running.status.cores", lambda: 4)
-    monkeypatch.setattr("pathlib.Path.read_text", lambda self: "MemAvailable: 8000000 kB\n")
-    assert most_workers() == 10
-    monkeypatch.setattr("pathlib.Path.read_text", lambda self: "MemAvailable: 900000000 kB\n")
-    assert most_workers() == 32
-    monkeypatch.setattr("pathlib.Path.read_text", lambda self: "MemAvailable: 1000 kB\n")
-    assert most_workers() == 4
+@pytest.mark.parametrize(
+    ("group", "files", "expected"),
+    [
+        ("0::/", {"cpu.max": "max 100000"}, 6),
+        ("0::/a/b", {"a/cpu.max": "250000 100000", "a/b/cpu.max": "max 100000"}, 2),
+        ("0::/", {"cpu.max": "50000 100000"}, 1),
+        ("0::/", {"cpu.max": "900000 100000"}, 6),
+        ("4:cpu,cpuacct:/docker/1\n0::/", {"cpu/cpu.cfs_quota_us": "300000"}, 3),
+        ("4:cpu:/", {"cpu/cpu.cfs_quota_us": "-1"}, 6),
+    ],
+)
+def test_memory_and_cores_bound_it_and_the_limits_of_a_container(
+    group: str,
+    files: dict[str, str],
+    expected: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("os.sched_getaffinity", lambda process: set(range(6)), raising=False)
+    made = {f"sys/fs/cgroup/{name}": text for name, text in files.items()}
+    made |= {"proc/self/cgroup": group, "sys/fs/cgroup/cpu/cpu.cfs_period_us": "100000"}
+    for name, text in made.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(f"{text}\n")
+    assert cores(tmp_path) == most_workers(tmp_path) == expected
+    (tmp_path / "proc/meminfo").write_text("MemAvailable: 90000000 kB\n")
+    assert most_workers(tmp_path) == PER_CORE * expected
+    (tmp_path / "sys/fs/cgroup/memory.max").write_text(f"{7 * MEMORY:.0f}\n")
+    if "0::/" in group:
+        assert most_workers(tmp_path) == min(max(7, expected), PER_CORE * expected)
 
 
 # -------------------------------- `--log wandb`, against a W&B that only remembers what it was told
