@@ -7,6 +7,7 @@ of it. What is made so far lies below `episodes/` in the folder of the data set:
     episodes/settings.json                       what is being collected, and with which versions
     episodes/ROBOT/MODE/TASK-Ln/SEED.zip         an episode (`episode`)
     episodes/ROBOT/MODE/TASK.jsonl               a line for every seed that gave none
+    episodes/kept                                of a finished data set: they stay
 
 Each is written at once or not at all, so a kill at any byte is harmless.
 """
@@ -48,7 +49,7 @@ from robospa.tasks.seeds import FIRST_TRAINING_SEED, ListKey
 from robospa.text import clock_text, counted, size_text
 from robospa.trial import path_part
 
-EPISODES, SETTINGS = "episodes", "settings.json"
+EPISODES, SETTINGS, KEPT = "episodes", "settings.json", "kept"
 
 Facts = Mapping[str, Mapping[str, object]]
 """What makes two collections the same, as JSON values: `settings` and `versions`."""
@@ -345,9 +346,11 @@ def _check_folder(out: Path, store: EpisodeStore, resume: bool) -> None:
 
 
 def _clear(out: Path, store: EpisodeStore, keep_episodes: bool) -> None:
-    """Leave nothing in `out` but the data set, and its episodes if they are wanted."""
-    if not keep_episodes and store.folder.exists():
-        with storage_errors(store.folder):
+    """Leave nothing in `out` but the data set, and its episodes if they are or were wanted."""
+    with storage_errors(store.folder):
+        if keep_episodes and store.folder.exists():
+            (store.folder / KEPT).touch()
+        elif store.folder.exists() and not (store.folder / KEPT).exists():
             shutil.rmtree(store.folder)
     for path in (out / LOCK, *out.rglob(PARTIAL)):  # of one that was killed
         path.unlink(missing_ok=True)

@@ -44,7 +44,7 @@ from robospa.tasks.modes import for_training
 from robospa.tasks.sampling.places import LayoutError
 from robospa.tasks.seeds import FIRST_SEED, FIRST_TRAINING_SEED, ListKey
 from robospa.text import markdown_table, size_text
-from robospa.trial import TrialKey
+from robospa.trial import REFERENCE, TrialKey
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -94,7 +94,8 @@ def schema(made_by: str) -> pa.Schema:
 
 
 COLUMNS = {
-    "id": "task, level, seed and scene mode, which `task`, `level`, `seed` and `mode` have too",
+    "id": "task, level, seed and scene mode, which `task`, `level`, `seed` and `mode` have too, "
+    f"and the robot, if it is not {REFERENCE}",
     "category": "of the task, such as GAC",
     "wording": "of the sentence: train or heldout, in words that are for evaluation",
     "sentence": "what is asked for",
@@ -190,8 +191,9 @@ def _row(
 ) -> Row:
     target = asked_for(setup.tracker)
     order = sorted(masks)
+    robot = "" if trial.embodiment == REFERENCE else f"-{trial.embodiment}"
     return {
-        "id": f"{trial.task}-L{trial.level}-{trial.seed}-{trial.mode}",
+        "id": f"{trial.task}-L{trial.level}-{trial.seed}-{trial.mode}{robot}",
         "task": trial.task,
         "category": setup.task.category,
         "level": trial.level,

@@ -154,6 +154,12 @@ def test_a_finished_data_set_is_not_written_again(tmp_path: Path) -> None:
     assert {k: v for k, v in contents(tmp_path).items() if k != ".lock"} == before
 
 
+def test_episodes_that_were_kept_stay_when_a_finished_data_set_is_resumed(tmp_path: Path) -> None:
+    run(order(tmp_path), keep=True)
+    assert run(order(tmp_path), resume=True) is None
+    assert len(list((tmp_path / EPISODES).rglob("*.zip"))) == 6
+
+
 def test_one_that_is_not_finished_wants_resume_and_the_same_settings(tmp_path: Path) -> None:
     EpisodeStore(tmp_path / EPISODES).begin(order(tmp_path).facts)
     refused(order(tmp_path), "--resume")
