@@ -31,6 +31,7 @@ from robospa.results.scoring.models import (
     ModelResults,
     categories_of,
     one_policy,
+    restricted,
     results_of_run,
 )
 from robospa.results.scoring.scores import Variant, weights_of
@@ -340,32 +341,42 @@ AXES = {
 def by_axis(models: Sequence[ModelResults], metric: str = "sr") -> Table | None:
     """The table of runs that differ in robot, scene mode, split or clock; None if these are none.
 
-    Rows are categories, dimensions and the whole, over all variants that every run has results of.
+    Rows are categories, dimensions and the whole, over all variants that every run has results of,
+    and if these share seeds, over the trials on seeds that every run has results of.
     """
     axes = [part for part in FREE if len({getattr(m.setting, part) for m in models}) > 1]
     if len(models) < 2 or not axes or not one_policy(models):
         return None
-    samples = [model.samples(metric) for model in models]
-    shared = [v for v in samples[0] if all(v in other for other in samples[1:])]
+    shared = [v for v in models[0].samples(metric) if all(v in m.trials for m in models)]
     if not shared:
         return None
+    seeds = {v: set.intersection(*(set(m.trials[v]) for m in models)) for v in shared}
+    alone = sum(len(m.trials[v]) - len(seeds[v]) for m in models for v in shared)
+    if paired := all(seeds.values()):
+        models = [
+            replace(m, trials={v: {n: m.trials[v][n] for n in seeds[v]} for v in shared})
+            for m in (restricted(model, shared) for model in models)
+        ]
     names = [" ".join(value for part in axes for value in getattr(m.setting, part)) for m in models]
     pairs = [
         {pair.variant: pair for pair in paired_variants(model, models[0], metric)[0]}
         for model in models[1:]
     ]
+    sides = [{v: pair.second for v, pair in pairs[0].items()}]
+    sides += [{v: pair.first for v, pair in found.items()} for found in pairs]
     category = {name: c for model in models for name, c in model.categories.items()}
     rows = []
     for label, kind, chosen in collections(category):
         variants = [v for v in shared if category[v[0]] in chosen]
         if variants:
             weights = weights_of(variants, category)
-            own = [interval_of([s[v] for v in variants], weights) for s in samples]
+            own = [interval_of([side[v] for v in variants], weights) for side in sides]
             gaps = [_estimate([found[v] for v in variants], weights, METHODS[0]) for found in pairs]
             cells = (*map(estimate_cell, own), *(estimate_cell(gap, "+z.1f") for gap in gaps))
             rows.append(TableRow(label, cells, "row" if kind == "category" else "average"))
-    paired = all(pair.gap is not None for found in pairs for pair in found.values())
     how = "paired by seed" if paired else "not paired: some variants share no seed"
+    if paired and alone:
+        how += f"; {counted(alone, 'trial')} on seeds that not all have results of: left out"
     note = (
         f"In percent, over the {len(shared)} variants that all have results of, with 95 % "
         f"intervals; differences in percentage points, {how}."

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from robospa.results.paper.origin import banner
+from robospa.results.paper.rounding import shown
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.models import COMPARISON, IncomparableError, ModelResults, check_alike
 from robospa.results.scoring.scores import Variant, sample_of, succeeded, weights_of
@@ -189,10 +190,10 @@ def worst_and_best(first: ModelResults, second: ModelResults, metric: str) -> li
     counts = " and ".join(
         f"{model.name} lacks {n}" for model, n in zip(models, missing, strict=True) if n
     )
+    worst, best = (shown(100 * gap) for gap in (low - other_high, high - other_low))
     return [
-        f"{counts} of the trials that both list: over these the difference is "
-        f"{100 * (low - other_high):+.1f} in the worst and {100 * (high - other_low):+.1f} in the "
-        f"best case for {first.name}."
+        f"{counts} of the trials that both list: over these the difference is {worst:+.1f} in the "
+        f"worst and {best:+.1f} in the best case for {first.name}."
     ]
 
 

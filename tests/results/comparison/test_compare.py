@@ -255,6 +255,20 @@ def test_modes_stand_side_by_side_with_their_paired_difference(sides: list[Model
         assert gap.text.startswith("-37.5 [-")
 
 
+def test_what_one_lost_is_left_out_of_all_its_columns(tmp_path: Path) -> None:
+    """The variant that the third lacks counts nowhere."""
+    records = [*trials("clean", 6), *trials("randomized", 3)[:6], *trials("randomized-seen", 0)]
+    records += outcomes(MUGS, 1, [1]) + [
+        replace(r, key=replace(r.key, mode="randomized")) for r in outcomes(MUGS, 1, [0])
+    ]
+    run = make_run(tmp_path / "run", records)
+    table = by_axis([results_of_run(part, part.keys[0].mode) for part in by_setting(run)])
+    assert table is not None and {row.label for row in table.rows} == {"GAC", "spatial", "overall"}
+    for row in table.rows:
+        assert [cell.value for cell in row.cells] == [100, 50, 0, -50, -100]
+    assert "4 trials on seeds that not all have results of: left out" in table.notes[0]
+
+
 def test_runs_of_one_setting_have_no_such_table(sides: list[ModelResults]) -> None:
     assert by_axis(sides[:1]) is None and by_axis([sides[0], sides[0]]) is None
 
