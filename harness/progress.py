@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, TextIO, TypeVar
 from robospa.harness.running.status import ServerStats, Status, server_text, shares_text
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.statistics.intervals import wilson
-from robospa.text import clock_text, counted, percent_text, plain_console, recording_console
+from robospa.results.tables import estimate_cell
+from robospa.text import clock_text, counted, plain_console, recording_console
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -244,8 +245,7 @@ class Progress(Bar):
 
 def rate_text(successes: int, trials: int) -> str:
     """`25.0 % [7.1, 59.1]`: a rate with its 95 % interval, as if all trials were of one kind."""
-    found = wilson(successes, trials)
-    return percent_text(found.value, found.low, found.high).replace(" [", " % [")
+    return estimate_cell(wilson(successes, trials)).text.replace(" [", " % [")
 
 
 def _group(*lines: RenderableType) -> RenderableType:

@@ -283,7 +283,8 @@ def evidence_lines(evidence: BadgeEvidence) -> list[tuple[str, str]]:
 
 
 def page_values(entry: Entry) -> dict[str, dict[str, list[list[float] | int]]]:
-    """Percent by metric, row and level (0: all levels) as [value, low, high]; 0 is no value."""
+    """Percent by metric, row and level (0: all levels) as [value, low, high], with digits enough to
+    be rounded as elsewhere; 0 is no value."""
     made: dict[str, dict[str, list[list[float] | int]]] = {}
     rows = [*load().tasks, *CATEGORIES, *DIMENSIONS, rounding.OVERALL]
     for metric in METRICS:
@@ -304,7 +305,7 @@ def _shown(column: Column, metric: str, row: str, level: int) -> list[float] | i
         estimate = part.values.get(metric) if part else None
     if estimate is None:
         return 0
-    return [round(100 * x, 2) for x in (estimate.value, estimate.low, estimate.high)]
+    return [round(100 * x, 6) for x in (estimate.value, estimate.low, estimate.high)]
 
 
 def all_entries(submissions: Sequence[Submission]) -> list[Entry]:

@@ -457,5 +457,5 @@ def paired(first: ModelResults, second: ModelResults) -> dict[str, Rows]:
 
 def _shown(row: Difference) -> list[float | None]:
     found = row.estimate
-    numbers = [round(100 * x, 2) for x in (found.value, found.low, found.high)]
+    numbers = [round(100 * x, 6) for x in (found.value, found.low, found.high)]
     return [*numbers, row.only_first, row.only_second, float(f"{row.q:.2g}")]

@@ -22,11 +22,6 @@ def interval_text(value: float, low: float, high: float, *, style: str = "z.1f")
     return f"{value:{style}} [{low:{style}}, {high:{style}}]"
 
 
-def percent_text(value: float, low: float, high: float, *, style: str = "z.1f") -> str:
-    """`interval_text` of fractions, in percent."""
-    return interval_text(100 * value, 100 * low, 100 * high, style=style)
-
-
 def counted(count: float, word: str) -> str:
     """`1 trial`, `2 trials`."""
     return f"{count:g} {word}" + "s" * (count != 1)

@@ -1,20 +1,11 @@
 import pytest
 
-from robospa.text import (
-    clock_text,
-    duration_text,
-    interval_text,
-    listed,
-    markdown_table,
-    percent_text,
-    some,
-)
+from robospa.text import clock_text, duration_text, interval_text, listed, markdown_table, some
 
 
 def test_numbers_with_their_intervals() -> None:
     assert interval_text(12, 5.649, 23.751) == "12.0 [5.6, 23.8]"
     assert interval_text(-0.001, 1, 2) == "0.0 [1.0, 2.0]"
-    assert percent_text(0.5, -0.25, 1, style="+z.1f") == "+50.0 [-25.0, +100.0]"
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import types
 import pytest
 from fake_runs import trial_record
 
-from robospa.harness.progress import Progress, details, summary
+from robospa.harness.progress import Progress, details, rate_text, summary
 from robospa.harness.running.status import ServerStats, Status
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
@@ -30,6 +30,7 @@ def test_plain_lines_where_there_is_no_terminal() -> None:
     first, last = stream.getvalue().splitlines()
     assert first == "1 trial to run, 0 already done"
     assert last.startswith("1/1 trials, success 0.0 %")
+    assert rate_text(1, 16) == "6.3 % [1.1, 28.3]", "as in tables, not 6.2"
 
 
 def test_films_are_counted_beside_the_trials_and_after_them() -> None:

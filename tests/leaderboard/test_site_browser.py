@@ -15,6 +15,7 @@ from robospa.leaderboard.entries import BADGES, entry_of, published_entries
 from robospa.leaderboard.site import index_page, pairs_of, write_model, write_pairs
 from robospa.leaderboard.submission import read_submission, read_submissions
 from robospa.results.comparison.compare import over_levels
+from robospa.results.paper.rounding import shown
 from robospa.results.records.runs import read_run
 from robospa.results.scoring.models import results_of_run
 
@@ -112,6 +113,11 @@ def test_columns_sort_both_ways_by_click_and_key(page: Page) -> None:
     page.click("#board th[data-name=badge] button")
     badges = [list(BADGES.values()).index(text) for text in column(page, "badge")]
     assert badges == sorted(badges, reverse=True), "the strongest first"
+
+
+def test_numbers_are_rounded_as_in_every_table(page: Page) -> None:
+    values = [8.35, 6.25, 6.2496, 11.249999999999998, -8.35, -0.01]
+    assert page.run(f"{values}.map(percent)") == [f"{shown(value):.1f}" for value in values]
 
 
 def test_filters_work_together_and_are_cleared(page: Page) -> None:

@@ -12,7 +12,8 @@ const value = (model, column) => model.values[column.metric]?.[column.row]?.[col
 const BESIDE = { sr1: "sr", onta1: "onta" };
 const official = (model, column) => BESIDE[column.metric] ? value(model, { ...column, metric: BESIDE[column.metric] }) : null;
 const shownValue = (model, column) => value(model, column) || official(model, column);
-const percent = (x) => x.toFixed(1).replace(/^-(0\.0)$/, "$1");
+// As `rounding.shown`: noise of the last bits does not decide what is half.
+const percent = (x) => (Math.sign(x) * Math.floor(Math.abs(x.toFixed(9)) * 10 + 0.5) / 10).toFixed(1);
 const interval = (v) => `[${percent(v[1])}, ${percent(v[2])}]`;
 
 // Two intervals make that of the difference (MOVER); `many` comparisons share the 5 %.
