@@ -27,7 +27,7 @@ SPLITS = ("train", "heldout", "indirect")
 def tasks(
     name: Annotated[
         str | None,
-        typer.Argument(help="a task; without it, all; with --gallery a list, as in `eval`"),
+        typer.Argument(help="a task, or a list as in `eval`, such as GAC; without it, all"),
     ] = None,
     level: Annotated[int, typer.Option(help="1 to 5")] = 1,
     seed: Annotated[int, typer.Option(callback=SEED, help="the scene's seed")] = 100_000,
@@ -61,21 +61,19 @@ def tasks(
     if world is not None and (as_json or view):
         raise typer.BadParameter("--world goes with pictures: leave out --json and --view")
     splits = SPLITS if split is None else (split,)
-    if as_json:
-        found: object = (
-            _list_json() if name is None else _scene_json(_scene(name, level, seed), splits)
-        )
-        print_json(found)
-    elif gallery:
-        _gallery(console, name, seed, split or "heldout", world, out or GALLERY)
-    elif name is None:
+    listed = _named(name)
+    if gallery and not as_json:
+        _gallery(console, listed, seed, split or "heldout", world, out or GALLERY)
+    elif len(listed) > 1:
         if view:
             raise typer.BadParameter("--view needs a task; `robospa tasks` lists them")
-        console.print(_listing())
+        print_json(_list_json(listed)) if as_json else console.print(_listing(listed))
+    elif as_json:
+        print_json(_scene_json(_scene(listed[0], level, seed), splits))
     elif view:
-        _view(_scene(name, level, seed), split or "heldout", port, minutes)
+        _view(_scene(listed[0], level, seed), split or "heldout", port, minutes)
     else:
-        scene = _scene(name, level, seed)
+        scene = _scene(listed[0], level, seed)
         told, shown = (scene, scene) if world is None else _official(world)(scene)
         pixels = parse_size(size)
         _describe(console, told, splits)
@@ -103,23 +101,26 @@ def parse_size(text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
-def _find(name: str) -> Task:
+def _named(names: str | None) -> list[Task]:
+    """The tasks of a list as in `eval`; all without one."""
+    from robospa.harness.selection import parse_tasks
+    from robospa.harness.settings import SettingsError
     from robospa.tasks.catalog import task
+    from robospa.tasks.catalog import tasks as all_tasks
 
     try:
-        return task(name)
-    except KeyError as error:
-        raise typer.BadParameter(str(error.args[0])) from None
+        return [task(name) for name in (all_tasks() if names is None else parse_tasks(names))]
+    except SettingsError as error:
+        raise typer.BadParameter(str(error)) from None
 
 
-def _scene(name: str, level: int, seed: int) -> Scene:
+def _scene(task: Task, level: int, seed: int) -> Scene:
     from robospa.tasks.catalog import build_scene
 
-    found = _find(name)
     if seed < 0:
         raise typer.BadParameter(f"seed {seed} is negative; shipped seeds start at 100000")
     try:
-        return build_scene(found.name, level, seed)
+        return build_scene(task.name, level, seed)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
 
@@ -161,11 +162,10 @@ def per_level(values: list[int]) -> str:
     return str(values[0]) if rises <= {0} else " ".join(map(str, values))
 
 
-def _listing() -> Table:
+def _listing(listed: Sequence[Task]) -> Table:
     from rich import box
     from rich.table import Table
 
-    from robospa.tasks.catalog import tasks as all_tasks
     from robospa.trial import BASIC, DIMENSIONS
 
     groups = {**DIMENSIONS, "basic": BASIC}
@@ -180,7 +180,7 @@ def _listing() -> Table:
     for heading in ("task", "category", "n", "T"):
         table.add_column(heading, no_wrap=True)
     table.add_column("limit")
-    for task in all_tasks().values():
+    for task in listed:
         levels = [task.levels[k] for k in sorted(task.levels)]
         names = ("candidates", "subtasks", "steps")
         limits = (per_level([getattr(level, name) for level in levels]) for name in names)
@@ -215,9 +215,10 @@ def _describe(console: Console, scene: Scene, splits: tuple[str, ...]) -> None:
     from rich.table import Table
     from rich.text import Text
 
+    from robospa.tasks.catalog import task as find_task
     from robospa.tasks.sentences import instruction
 
-    task = _find(scene.task)
+    task = find_task(scene.task)
     limits = task.levels[scene.level]
     table = Table.grid(padding=(0, 2))
     table.add_column(style="bold", no_wrap=True)
@@ -280,24 +281,17 @@ def _view(scene: Scene, split: str, port: int, minutes: float) -> None:
 
 
 def _gallery(
-    console: Console, name: str | None, seed: int, split: str, world: str | None, path: Path
+    console: Console, chosen: list[Task], seed: int, split: str, world: str | None, path: Path
 ) -> None:
     from rich.progress import track
     from rich.text import Text
 
     from robospa.harness.pictures import gallery
-    from robospa.harness.selection import parse_tasks
-    from robospa.harness.settings import SettingsError
     from robospa.harness.sim.sapien_world import SapienWorld
     from robospa.harness.world import RenderUnavailable, SceneUnstable
     from robospa.tasks.catalog import build_scene
-    from robospa.tasks.catalog import tasks as all_tasks
     from robospa.tasks.sentences import instruction
 
-    try:
-        chosen = [_find(each) for each in (parse_tasks(name) if name else all_tasks())]
-    except SettingsError as error:
-        raise typer.BadParameter(str(error)) from None
     changed = None if world is None else _official(world)
     told: dict[str, Scene] = {}
 
@@ -330,9 +324,7 @@ def _gallery(
 # -- JSON ---------------------------------------------------------------------------------------
 
 
-def _list_json() -> list[dict[str, object]]:
-    from robospa.tasks.catalog import tasks
-
+def _list_json(listed: Sequence[Task]) -> list[dict[str, object]]:
     return [
         {
             "name": task.name,
@@ -342,7 +334,7 @@ def _list_json() -> list[dict[str, object]]:
             "success": task.success,
             "levels": {str(number): asdict(level) for number, level in task.levels.items()},
         }
-        for task in tasks().values()
+        for task in listed
     ]
 
 

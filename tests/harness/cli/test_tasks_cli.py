@@ -43,6 +43,14 @@ def test_without_a_name_every_task_is_listed() -> None:
     assert [name for name in tasks() if name not in listed] == []
 
 
+def test_the_tasks_of_a_category_are_listed() -> None:
+    assert [row["category"] for row in json.loads(run("gac,CBG", "--json"))] == ["GAC"] * 4 + [
+        "CBG"
+    ] * 5
+    assert "Stack_Blocks" not in run("spatial") and "no task 'GAX'" in robospa("tasks", "GAX").err
+    assert "--view needs a task" in robospa("tasks", "GAC", "--view").err
+
+
 def test_a_scene_is_described_with_both_instructions() -> None:
     shown = run(NAME, "--level", "3", "--seed", "100003", "--no-frame")
     scene = build_scene(NAME, 3, 100003)
