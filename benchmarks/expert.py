@@ -103,8 +103,8 @@ A policy that holds still makes progress by the official rules: the first block 
 counts as done, pairs of a row may stand in order by chance, and a red block may lie in its area
 (see `idle_progress` in [fidelity](fidelity.md)). Random motion sometimes solves two tasks: an open
 gripper's touch clicks the can of Click_Can_Place_Items (7 of 20 seeds), and a bottle of
-Put_Bottles_Dustbin may fall into the bin (1 of 20). The seed lists were made once; of 25 clean
-seeds that they leave out, the expert of 2026-11-24 solves 14. It solves 7,098 of 7,100 unseen
+Put_Bottles_Dustbin may fall into the bin (1 of 20). The seed lists were made once; of 26 clean
+seeds that they leave out, the expert of 2026-11-29 solves 14. It solves 7,098 of 7,100 unseen
 seeds, twenty of every variant, failing one each of Move_Playing_Cards_Away 2 and
 Separate_Fries_Bread 3 (`robospa seeds all,basic --start 900000 --count 20 --check`).""",
     )

@@ -66,7 +66,8 @@ class PolicySpec:
     execute: Annotated[int, Meta(ge=1)] | None = None
     """Actions of a chunk that are executed before the next query; None for all."""
     history: Annotated[tuple[Offset, ...], Meta(max_length=64)] = ()
-    """Earlier observations that it reads as well: negative offsets in executed actions."""
+    """Earlier observations that it reads as well: negative offsets in executed actions, in
+    real time in periods."""
     image_codec: Annotated[str, one_of(CODECS)] = "raw"
     """How images travel: `raw`, or `jpeg` (quality 90)."""
     batch: Annotated[int, Meta(ge=1, le=4096)] = 1

@@ -29,6 +29,8 @@ EXTRAS = {
     "viser": "view",
 }
 """Module -> the extra that brings it."""
+OTHERWISE = {"torch": "torch --index-url https://download.pytorch.org/whl/cpu"}
+"""Module -> what pip is told: PyPI's own builds bring several GB for CUDA, and ours need a CPU."""
 
 
 class MissingPackage(ModuleNotFoundError):
@@ -52,8 +54,8 @@ def need(module: str, extra: str = "") -> ModuleType:
 def remedy(module: str, extra: str = "") -> str:
     """What installs `module`, as the end of a sentence."""
     wanted = extra or EXTRAS.get(module)
-    if not wanted:
-        return f"install it with: pip install {module}"
+    if not wanted or module in OTHERWISE:
+        return f"install it with: pip install {OTHERWISE.get(module, module)}"
     return f"install it with: pip install '{source()}[{wanted}]'"
 
 

@@ -5,8 +5,8 @@
 #
 # The trials with held-out sentences, and a bundle. The weights are those in baselines/learned/weights;
 # with ROBOSPA_LEARN=1 they are first trained anew (a night of two cores). It needs PyTorch: `pip
-# install torch` in .venv, or ROBOSPA_LEARN_PYTHON, the path of a Python that has it beside robospa's
-# packages. Every step goes on where it was interrupted; what it makes lies in runs/learned-row.
+# install torch --index-url https://download.pytorch.org/whl/cpu` in .venv, or ROBOSPA_LEARN_PYTHON,
+# the path of a Python that has it beside robospa's packages. Every step goes on where it was interrupted; what it makes lies in runs/learned-row.
 
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -21,7 +21,7 @@ export PYTHONPATH=$PWD
 say() { printf '\nlearn: %s\n' "$*"; }
 
 "$python" -c "import torch" 2>/dev/null || {
-    echo "learn: $python has no PyTorch: pip install torch there, or set ROBOSPA_LEARN_PYTHON" >&2
+    echo "learn: $python has no PyTorch: pip install torch --index-url https://download.pytorch.org/whl/cpu there, or set ROBOSPA_LEARN_PYTHON" >&2
     exit 1
 }
 mkdir -p "$out"

@@ -1,6 +1,6 @@
 """RoboSPA as a benchmark of vla-eval 0.8, run by its orchestrator in this environment, no Docker.
 
-    pip install vla-eval 'robospa[sim,gym]'
+    pip install vla-eval '/path/to/robospa[sim,gym]'
     PYTHONPATH=examples/vla_eval vla-eval run --no-docker --config examples/vla_eval/robospa.yaml
 
 Observations are named as those of vla-eval's RoboTwin benchmark, so that a server for that one

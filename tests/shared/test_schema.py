@@ -250,6 +250,7 @@ def test_a_remedy_names_where_robospa_came_from(
 ) -> None:
     monkeypatch.setattr(metadata, "distribution", lambda name: Installed(note))
     assert extras.remedy("pandas") == f"install it with: pip install '{expected}[notebook]'"
+    assert "pip install torch --index-url https://download.pytorch" in extras.remedy("torch")
 
 
 def test_every_extra_that_is_named_exists() -> None:
