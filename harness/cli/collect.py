@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
@@ -119,7 +120,7 @@ def collect(
     from robospa.harness.datasets import collect as collecting
 
     order = collecting.Order(_group(Collection, given), layout, out)
-    again = f"the same command with --out {out} --resume goes on from here"
+    again = f"the same command with --out {quote(str(out))} --resume goes on from here"
     with (
         resumable("the collection", again, (MakerError, StorageError)),
         pool_opener(_group(Compute, given)) as open_pool,
@@ -141,7 +142,8 @@ def collect(
     for line in result.missing:
         aside(f"robospa: {line}")
     if not as_json:
-        print(f"{out}: {result.episodes} episodes; robospa collect --verify {out} checks them")
+        checked = f"robospa collect --verify {quote(str(out))} checks them"
+        print(f"{out}: {result.episodes} episodes; {checked}")
     if result.missing:
         raise typer.Exit(1)
 
@@ -196,7 +198,7 @@ def _convert(folder: Path, out: Path, layout: str, images: str, as_json: bool) -
         return
     absent = ", ".join(lacks)
     print(f"{out}: {found.made.episodes} official recordings; they do not have {absent}")
-    print(f"robospa collect --verify {out} checks hashes and counts")
+    print(f"robospa collect --verify {quote(str(out))} checks hashes and counts")
 
 
 def _verify(out: Path, replays: int, as_json: bool) -> None:

@@ -3,6 +3,7 @@ several latencies."""
 
 from __future__ import annotations
 
+import shlex
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -103,7 +104,8 @@ def run_and_show(request: Request, *, as_json: bool = False) -> None:
     from robospa.results.scoring.repeats import many_policy_errors
 
     folder = request.config.folder
-    again = f"the same command with --out {folder} --resume goes on from here"
+    written = shlex.quote(str(folder))  # as a shell takes it
+    again = f"the same command with --out {written} --resume goes on from here"
     unfilmed = ""
     try:
         with resumable("the run", again):
@@ -125,14 +127,14 @@ def run_and_show(request: Request, *, as_json: bool = False) -> None:
         )
         raise typer.Exit(1)
     if text := many_policy_errors(run):
-        hint = f"look at the reasons above, or at `robospa report {folder} --failures`"
+        hint = f"look at the reasons above, or at `robospa report {written} --failures`"
         aside(f"robospa: {text}; {hint}")
         raise typer.Exit(1)
     if unfilmed:
         aside(unfilmed)
         raise typer.Exit(130)
     if not as_json:
-        print(f"Run: {folder}   Report: robospa report {folder}")
+        print(f"Run: {folder}   Report: robospa report {written}")
 
 
 def run_data(run: Run) -> dict[str, object]:

@@ -1,6 +1,7 @@
 """`robospa learn`: train the learned reference anew."""
 
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -36,4 +37,4 @@ def learn(
     except KeyboardInterrupt:
         aside(f"robospa: interrupted; the same command goes on in {out}")
         raise typer.Exit(130) from None
-    print(f"{out}: trained; robospa serve learned {out} serves it")
+    print(f"{out}: trained; robospa serve learned {quote(str(out))} serves it")

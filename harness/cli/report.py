@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -167,7 +168,7 @@ def _safety(folder: Path, as_json: bool) -> None:
         print_json({key.slug: one for key, one in made.found.items()})
         return
     print(made)
-    print(f"Kept in {folder}: robospa report {folder} shows it beside the scores")
+    print(f"Kept in {folder}: robospa report {quote(str(folder))} shows it beside the scores")
 
 
 def _make_films(folder: Path) -> Run:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shlex
 import time
 import traceback
 from collections import Counter
@@ -266,7 +267,7 @@ def film_lines(films: Films, seconds: float = 0.0) -> list[str]:
 
 def how_to_film(folder: Path) -> str:
     """What makes the films that a run lacks."""
-    return f"`robospa report {folder} --film` makes them"
+    return f"`robospa report {shlex.quote(str(folder))} --film` makes them"
 
 
 def unfilmed(run: Run) -> list[TrialRecord]:

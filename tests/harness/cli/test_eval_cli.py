@@ -71,12 +71,14 @@ def test_a_server_is_evaluated_and_reported(tmp_path: Path) -> None:
 
 @quickly
 def test_a_nonsense_answer_is_the_policys_failure(tmp_path: Path) -> None:
+    folder = tmp_path / "my run"
     with ServerThread(policy_factory=NanPolicy) as server:
-        code, out, err = robospa(*eval_words(tmp_path / "run", server.url, trials=1))
+        code, out, err = robospa(*eval_words(folder, server.url, trials=1))
     assert code == 1
     assert "policy error 2: the policy answered nan in action 1, dimension 3" in out
     assert "2 of 2 trials ended in a policy error" in err
-    records = results(tmp_path / "run")
+    assert f"`robospa report '{folder}' --failures`" in err  # as a shell takes it
+    records = results(folder)
     assert [r.end for r in records] == ["policy_error"] * 2
     assert "action 1" in records[0].message
 
