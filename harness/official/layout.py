@@ -315,7 +315,7 @@ def parse_official(
         trouble = f"objects are built in, because there are no official ones: {error}"
         return options, OfficialLayout(False, options.switches, trouble=trouble)
     textures = opened.archive.root / "background_texture"
-    if textures.is_dir():  # unless the user has named others
+    if any(textures.glob("*seen/*")):  # unless the user has named others
         os.environ.setdefault(VARIABLE, str(textures))
     faults = opened.faults(tasks)
     for task, fault in faults.items():

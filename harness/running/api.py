@@ -1,7 +1,9 @@
 """`robospa.evaluate`: an evaluation as one call, with every setting as a keyword."""
 
+import os
 import secrets
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal, cast
@@ -16,6 +18,26 @@ from robospa.results.run import LoadedRun, load_run
 PolicyFactory = Callable[[], Policy]
 
 
+@contextmanager
+def _folders_as_before() -> Iterator[None]:
+    """A world may name folders of assets and textures in the environment, for its workers; they are
+    not those of the next evaluation of this process."""
+    from robospa.harness import textures
+    from robospa.harness.packs import archive
+    from robospa.tasks.packs import pack
+
+    before = {name: os.environ.get(name) for name in (archive.VARIABLE, textures.VARIABLE)}
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name, None)
+            if value is not None:
+                os.environ[name] = value
+        pack.cache_clear()
+
+
+@_folders_as_before()
 def evaluate(
     policy: str | Sequence[str] | Policy | PolicyFactory | None = None,
     *,

@@ -40,7 +40,7 @@ from robospa.harness.official.sentences import (
     read_checkout,
 )
 from robospa.harness.official.slots import SLOTS, NoOfficialSentence, official_values
-from robospa.harness.running import evaluate
+from robospa.harness.running import api, evaluate
 from robospa.harness.running.policy_probe import ProbedPolicy
 from robospa.harness.running.request import make_request
 from robospa.harness.running.worker import load_parts, task_finder
@@ -49,6 +49,7 @@ from robospa.harness.trial import run_trial, task_parts
 from robospa.harness.world import SceneUnstable
 from robospa.harness.worlds import SPOKEN_PARTS
 from robospa.protocol.policy import PolicySpec
+from robospa.registry import UnknownName
 from robospa.tasks import packs
 from robospa.tasks.catalog import build_scene, tasks
 from robospa.tasks.colors import NAMED
@@ -116,6 +117,31 @@ def test_the_archive_that_is_named_is_found_by_workers_with_its_textures(cans: P
         request(cans, assets=str(cans / "no"))
     with pytest.raises(SettingsError, match="holds none of objects"):
         request(cans, assets=str(cans / "objects"), world="official")  # nobody wants ours instead
+
+
+def test_folders_of_one_evaluation_are_not_those_of_the_next(
+    cans: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("ROBOSPA_ASSETS")
+    seen = []
+
+    def fake_run(made: object) -> None:
+        seen.append(packs.pack("official").archive.root)  # type: ignore[attr-defined]
+        raise RuntimeError(os.environ["ROBOSPA_TEXTURES"])
+
+    monkeypatch.setattr("robospa.harness.running.api.run_request", fake_run)
+    with pytest.raises(RuntimeError, match="background_texture"):
+        api.evaluate("hold", world="official", assets=cans, tasks="Pick_Cans_Relational", trials=1)
+    assert seen == [cans] and not {"ROBOSPA_ASSETS", "ROBOSPA_TEXTURES"} & set(os.environ)
+    with pytest.raises((ValueError, UnknownName), match="no folder of official assets is known"):
+        packs.pack("official")
+
+
+def test_an_empty_folder_of_textures_counts_as_none(cans: Path) -> None:
+    for file in (cans / "background_texture").glob("*/*"):
+        file.unlink()
+    parse_official("official")
+    assert "ROBOSPA_TEXTURES" not in os.environ
 
 
 def test_without_an_archive_it_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
