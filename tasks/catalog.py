@@ -3,9 +3,11 @@
 import hashlib
 import importlib
 from functools import cache
+from importlib import metadata
 
 import numpy as np
 
+from robospa.registry import TASKS, load
 from robospa.tasks.modes import canonical
 from robospa.tasks.modes import mode as scene_mode
 from robospa.tasks.scene import SCENES, Scene
@@ -57,9 +59,6 @@ BASIC = ("basic_color.TASKS", "cross_view.BASIC", "canonical_index.BASIC")
 
 LEVELS = (1, 2, 3, 4, 5)
 
-EXTENSIONS = "robospa.tasks"
-"""Group of entry points by which other packages offer tasks: a name and "module:TASK"."""
-
 
 @cache
 def tasks() -> dict[str, Task]:
@@ -72,13 +71,12 @@ def extensions() -> dict[str, Task]:
     """Tasks of other installed packages.
 
     They are found by name only: what is installed never changes what "all tasks" means. ValueError
-    for an entry point that leads to no task, or to one with a name of the benchmark's.
+    for an entry point that leads to no task, or to one with a name of the benchmark's; UnknownName
+    for one that cannot be loaded.
     """
-    from importlib.metadata import entry_points
-
     found = {}
-    for point in entry_points(group=EXTENSIONS):
-        item = point.load()
+    for point in metadata.entry_points(group=TASKS):
+        item = load(point.value)
         if not isinstance(item, Task) or item.name in tasks():
             raise ValueError(
                 f"entry point {point.name!r} ({point.value}) offers no new task; "
@@ -111,10 +109,8 @@ def home_of(name: str) -> str:
     for where in (*DEFINED, *BASIC):
         if any(found.name == name for found in _defined(where)):
             return f"robospa.tasks.families.{where.rpartition('.')[0]}"
-    from importlib.metadata import entry_points
-
-    for point in entry_points(group=EXTENSIONS):
-        if getattr(point.load(), "name", "") == name:
+    for point in metadata.entry_points(group=TASKS):
+        if getattr(load(point.value), "name", "") == name:
             return point.value.partition(":")[0]
     return ""
 
@@ -176,6 +172,8 @@ def build_scene(
     vary = scene_mode(mode)
     identity = "/".join([SCENES, *([salt] if salt else []), found.name, str(level), str(seed)])
     draft = found.draw(level, generator(identity), WORKCELL)
+    if len({item.name for item in draft.objects}) < len(draft.objects):
+        raise ValueError(f"{found.name} level {level} seed {seed} has two objects of one name")
     scene = Scene(
         task=found.name,
         level=level,

@@ -11,7 +11,7 @@ from robospa.tasks.instructions import Phrasings, Templates
 from robospa.tasks.plan import Skill
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot
-from robospa.trial import BASIC, SPATIAL
+from robospa.trial import BASIC, CATEGORIES, SPATIAL
 from robospa.workcell import Workcell
 
 
@@ -122,6 +122,10 @@ class Task:
     success: str
     lead: Callable[[Scene], float] | None = None
     """By how much [m] what is asked for is ahead of what comes closest; None where nothing is."""
+
+    def __post_init__(self) -> None:
+        if self.category not in (known := (*CATEGORIES, *BASIC)):
+            raise ValueError(f"{self.name}: no category {self.category!r} in {', '.join(known)}")
 
     @property
     def dimension(self) -> str:

@@ -5,6 +5,7 @@ import re
 import sys
 import tomllib
 from collections.abc import Iterator
+from dataclasses import replace
 from http.server import ThreadingHTTPServer
 from importlib import import_module
 from pathlib import Path
@@ -24,12 +25,13 @@ from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.protocol.conformance import check
 from robospa.protocol.errors import HandshakeError
 from robospa.protocol.policy import TrialInfo
-from robospa.registry import ROBOTS, SCENE_MODES
+from robospa.registry import ROBOTS, SCENE_MODES, UnknownName
 from robospa.tasks import catalog, modes
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.instructions import similarity
 from robospa.tasks.scene import Scene
 from robospa.tasks.sentences import instruction, sentences, templates
+from robospa.tasks.task import SceneSample
 from robospa.trial import TrialKey
 from robospa.workcell import TABLE_TOP
 
@@ -76,14 +78,49 @@ def test_entries_that_lead_to_something_else_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.syspath_prepend(EXAMPLES)
-    wrong = {"robospa.tasks": {TASK: "leftmost_block.task:LEVELS"}, ROBOTS: {ROBOT: "math:pi"}}
+    wrong = {"robospa.tasks": {TASK: "leftmost_block.task:LEVELS"}}
+    wrong |= {ROBOTS: {ROBOT: "math:pi"}, SCENE_MODES: {MODE: "math:pi"}}
     monkeypatch.syspath_prepend(installed(tmp_path, wrong))
     forget()
     with pytest.raises(ValueError, match="LEVELS"):
         catalog.task(TASK)
     with pytest.raises(ValueError, match="Embodiment"):
         robots.embodiment(ROBOT)
+    with pytest.raises(ValueError, match="no function of a scene"):
+        modes.mode(MODE)
     forget()
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ("nowhere.task:TASK", "cannot load 'nowhere.task:TASK': No module"),
+        ("leftmost_block.task:MINE", "cannot load 'leftmost_block.task:MINE'"),
+    ],
+)
+def test_a_task_that_cannot_be_loaded_is_named(
+    value: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(EXAMPLES)
+    monkeypatch.syspath_prepend(installed(tmp_path, {"robospa.tasks": {TASK: value}}))
+    forget()
+    with pytest.raises(UnknownName, match=said):
+        catalog.task(TASK)
+    forget()
+
+
+def test_a_task_of_no_category_and_a_scene_of_equal_names_are_refused(package: Path) -> None:
+    task = catalog.task(TASK)
+    with pytest.raises(ValueError, match="no category 'CPX' in GAC, "):
+        replace(task, category="CPX")
+
+    def doubled(*given: Any) -> SceneSample:
+        made = task.draw(*given)
+        return replace(made, objects=made.objects[:1] * 2)
+
+    catalog.offer(replace(task, draw=doubled))
+    with pytest.raises(ValueError, match="two objects of one name"):
+        build_scene(TASK, 1, 0)
 
 
 # --- a task -----------------------------------------------------------------------------------

@@ -307,31 +307,40 @@ COMMON = TaskText(SHARED)
 
 @cache
 def _read(path: Path) -> Mapping[str, Any]:
-    return tomllib.loads(path.read_text(encoding="utf-8"))
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ValueError(f"{path} is no TOML file: {error}") from error
 
 
 @cache
 def _templates(path: Path, level: int, name: str) -> Templates:
     data = _read(path)
-    for group in data.get("templates", ()):
-        if level in group["levels"] and group.get("name", "") == name:
-            own = {**data, **group}
-            shared = _read(SHARED)["groups"][own["shared"]] if "shared" in own else {}
-            return composed({**shared, **own})
+    try:
+        for group in data.get("templates", ()):
+            if level in group["levels"] and group.get("name", "") == name:
+                own = {**data, **group}
+                shared = _read(SHARED)["groups"][own["shared"]] if "shared" in own else {}
+                return composed({**shared, **own})
+    except KeyError as error:
+        raise KeyError(f"{path}: templates lack {error}") from error
+    except ValueError as error:
+        raise ValueError(f"{path}, level {level}: {error}") from error
     raise KeyError(f"{path} has no templates {name!r} for level {level}")
 
 
 @lru_cache(maxsize=4096)
 def _phrasings(path: Path, entry: str, values: tuple[tuple[str, object], ...]) -> Phrasings:
-    found: Any = _read(path)["phrasings"]
-    for part in entry.split("."):
-        if part not in found:
-            raise KeyError(f"{path} has no phrasings {entry!r}; {part!r} is none of {list(found)}")
-        found = found[part]
-    train, heldout = (
-        tuple(text.format_map(dict(values)) for text in found[split])
-        for split in ("train", "heldout")
-    )
+    found: Any = _read(path).get("phrasings", {})
+    try:
+        for part in entry.split("."):
+            found = found[part]
+        train, heldout = (
+            tuple(text.format_map(dict(values)) for text in found[split])
+            for split in ("train", "heldout")
+        )
+    except KeyError as error:
+        raise KeyError(f"{path} has no {error} of the phrasings {entry!r}") from error
     return train, heldout
 
 

@@ -62,6 +62,8 @@ def mode(name: str) -> Mode:
         found: Mode = find(SCENE_MODES, base, "scene mode")
     except UnknownName as error:
         raise ValueError(str(error)) from error
+    if not callable(found):
+        raise ValueError(f"entry point {base!r} of {SCENE_MODES} leads to no function of a scene")
     if not colon:
         return found
     if not isinstance(found, ModeOfParts):

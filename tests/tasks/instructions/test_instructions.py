@@ -10,13 +10,14 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from robospa.tasks import catalog
-from robospa.tasks.instructions import SPLITS, masked_words, similarity
+from robospa.tasks.instructions import SPLITS, TaskText, masked_words, similarity
 from robospa.tasks.scene import Scene
 from robospa.tasks.sentences import ANY_KIND, instruction, kinds_clause, sentences, templates
 
@@ -315,6 +316,28 @@ def test_unknown_names_are_refused() -> None:
         templates("press_stapler_repeat", 6)
     with pytest.raises(ValueError, match="no instruction split 'unseen'"):
         instruction(scene_of("press_stapler_repeat", 1), "unseen")
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("levels = [", "is no TOML file"),
+        ("", "templates lack 'levels'"),
+        ("levels = [1]", "templates lack 'train'"),
+        ("levels = [1]\ntrain = ['a', 'b', 'c']", "level 1: 3 templates cannot share"),
+        ("levels = [2]", "no templates '' for level 1"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_said_with_its_name(
+    line: str, said: str, tmp_path: Path
+) -> None:
+    (tmp_path / "mine.toml").write_text(f"[phrasings.block]\ntrain = ['x']\n[[templates]]\n{line}")
+    text = TaskText(tmp_path / "mine.toml")
+    with pytest.raises((KeyError, ValueError), match=rf"mine\.toml.*{said}"):
+        text.templates(1)
+    if "TOML" not in said:
+        with pytest.raises(KeyError, match=r"mine\.toml has no 'heldout' of the phrasings 'block'"):
+            text.phrasings("block")
 
 
 def clean_and_cluttered(name: str) -> list[Scene]:
