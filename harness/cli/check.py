@@ -93,6 +93,8 @@ def check(
     physics, with a fix for each failure.
     """
     console = plain_console(quiet=as_json)
+    if url is None and (demo is not None or client is not None or instruction is not None):
+        raise typer.BadParameter("--demo, --instruction and --client go with a server's URL")
     if url is None:
         _check_machine(console, as_json)
         return

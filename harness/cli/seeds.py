@@ -94,12 +94,18 @@ def seeds(
 
 
 def _is_there(key: ListKey, count: int, folder: Path | None) -> bool:
-    from robospa.harness.seeds.lists import find_list, read_levels
+    from robospa.harness.seeds.lists import SHIPPED, find_list, read_levels
     from robospa.tasks.seeds import NoSeedList
 
     if folder is not None:
         return len(read_levels(folder / key.file).get(key.level, ())) >= count
     try:
-        return len(find_list(key).seeds) >= count
+        found = find_list(key)
     except NoSeedList:
         return False
+    if found.origin == SHIPPED and len(found.seeds) < count:
+        raise typer.BadParameter(
+            f"{key} has a shipped list of {len(found.seeds)} seeds, and evaluations find no longer "
+            "one: give --check or --out as well"
+        )
+    return len(found.seeds) >= count

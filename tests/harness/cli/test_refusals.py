@@ -74,6 +74,8 @@ MISTYPED = [
     ("compare a b --metric best", "'--metric': 'best' is not one of"),
     ("submit .", "--model"),
     ("check ws://127.0.0.1:9 --timeout -5", "-5 is not from 0.001 to 604800"),
+    ("check --demo no.hdf5", "go with a server's URL"),
+    ("seeds Pick_Blocks_Size --levels 1 --count 101", "a shipped list of 100 seeds"),
     ("tasks Pick_Block_Size", "did you mean Pick_Blocks_Size"),
     ("tasks Pick_Blocks_Size --level 6", "has levels"),
     ("tasks Pick_Blocks_Size --seed -1", "is not from 0 to"),
