@@ -164,8 +164,9 @@ class Progress(Bar):
 
     def __enter__(self) -> Progress:
         super().__enter__()
+        first = self._detail == float("-inf")  # again for the films
         self._detail = self._line - DETAILS + 2 * EVERY
-        if self._screen is None:
+        if self._screen is None and first:
             left = counted(self.total - self.done, "trial")
             self.note(f"{left} to run, {self.done} already done")
         return self

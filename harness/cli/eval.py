@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import shlex
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -107,19 +108,25 @@ def run_and_show(request: Request, *, as_json: bool = False) -> None:
     written = shlex.quote(str(folder))  # as a shell takes it
     again = f"the same command with --out {written} --resume goes on from here"
     unfilmed = ""
+
+    def show() -> bool:
+        run = replace(read_run(folder), in_progress=False)
+        if as_json:
+            print_json({"folder": folder, **run_data(run)})
+        elif run.manifest.settings.profile:
+            print(profile_of(run))
+        else:
+            for part in by_setting(run):
+                print_scores(part, results_of_run(part), beside=False)
+        sys.stdout.flush()
+        return True
+
     try:
         with resumable("the run", again):
-            run_request(request)
+            run_request(replace(request, after_trials=show))
     except FilmsInterrupted as error:
         unfilmed = f"robospa: interrupted after the last trial; {error}"
     run = read_run(folder)
-    if as_json:
-        print_json({"folder": folder, **run_data(run)})
-    elif run.manifest.settings.profile:
-        print(profile_of(run))
-    else:
-        for part in by_setting(run):
-            print_scores(part, results_of_run(part), beside=False)
     if run.missing:
         aside(
             f"robospa: {len(run.missing)} of {len(run.keys)} trials could not be run and are "

@@ -8,9 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal, cast
 
+from robospa.harness.running.evaluate import Request
 from robospa.harness.running.evaluate import evaluate as run_request
 from robospa.harness.running.request import goes_on, make_request, run_folder
 from robospa.harness.settings import EvaluationSettings, SettingsError, read_settings, updated
+from robospa.harness.worlds import SAPIEN_NAME
 from robospa.protocol.policy import Policy
 from robospa.protocol.server import ServerThread
 from robospa.results.run import LoadedRun, load_run
@@ -95,7 +97,7 @@ def evaluate(
         elif mapped is not None:
             asked = replace(asked, policy=())
         request = make_request(asked, token=token, resume=going)
-        run_request(request)
+        run_request(_returning(request))
         return load_run(request.config.folder)
     if token is not None:
         raise SettingsError("token goes with policy servers, and this policy is in this process")
@@ -107,8 +109,13 @@ def evaluate(
     with ServerThread(instance, policy_factory=factory, token=secret) as server:
         request = make_request(replace(asked, policy=(server.url,)), token=secret, resume=going)
         # The address ends with this call: whoever uses these settings again names a policy.
-        run_request(replace(request, settings=asked, in_process=True))
+        run_request(_returning(replace(request, settings=asked, in_process=True)))
     return load_run(request.config.folder)
+
+
+def _returning(request: Request) -> Request:
+    """`request` without the wait for films that can be made later as well."""
+    return replace(request, after_trials=lambda: request.config.world != SAPIEN_NAME)
 
 
 def _base(config: EvaluationSettings | str | Path | None) -> EvaluationSettings:

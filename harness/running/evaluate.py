@@ -20,7 +20,7 @@ from robospa.harness.progress import Progress, summary
 from robospa.harness.running.atomic_file import replace_file, run_lock
 from robospa.harness.running.attempts import attempts_spent, earlier_retries
 from robospa.harness.running.executor import RunAborted
-from robospa.harness.running.films import films_of, finish_films
+from robospa.harness.running.films import film_lines, films_of, finish_films
 from robospa.harness.running.manifest import about_machine, add_processor, check_folder, open_run
 from robospa.harness.running.policy_probe import (
     ProbedPolicy,
@@ -81,6 +81,8 @@ class Request:
     in_process: bool = False
     """The policy's server is one of this process, which ends with the run."""
     look: bool = False
+    after_trials: Callable[[], bool] = lambda: True
+    """Called before the films that a run still owes; False: they are not waited for."""
 
 
 class WorldBroken(Exception):
@@ -262,6 +264,7 @@ def evaluate(request: Request) -> None:
             runner.known = known
             runner.executor = executor
             films = films_of(config, known, request.options.workers if executor is None else 0)
+            stack.callback(films.close)
 
             def add(record: TrialRecord) -> None:
                 progress.add(record)
@@ -278,14 +281,19 @@ def evaluate(request: Request) -> None:
             try:
                 runner.run()
                 tracker.finish(folder)
-                about_films = finish_films(films, progress)
             finally:
-                films.close()
                 tracker.close()
-        remove_partial_files(folder)
-        shares = runner.times.overall_shares()
-        for text in [*summary(shares, runner.status(time.monotonic())), *about_films]:
+        for text in summary(runner.times.overall_shares(), runner.status(time.monotonic())):
             progress.note(text)
+        films.poll()
+        if request.after_trials() and films.pending:
+            with progress:
+                about_films = finish_films(films, progress)
+        else:
+            about_films = film_lines(films)
+        for text in about_films:
+            progress.note(text)
+        remove_partial_files(folder)
 
 
 __all__ = ["Request", "RunAborted", "WorldBroken", "evaluate", "probe_world"]

@@ -38,6 +38,7 @@ from robospa.results.failures.labels import label
 from robospa.results.records.manifest import RunError
 from robospa.results.records.runs import Run, film_name, films_in, finished
 from robospa.results.records.trial_record import TrialRecord
+from robospa.text import counted
 from robospa.trial import TrialKey
 
 if TYPE_CHECKING:
@@ -250,18 +251,17 @@ def finish_films(films: Films, progress: Progress) -> list[str]:
 
 
 def film_lines(films: Films, seconds: float = 0.0) -> list[str]:
-    """How many films were made, how long that was waited for, and why others were not."""
+    """How many films were made, how long that was waited for, and what becomes of others."""
     lines = []
     if films.made:
         waited = f"; waited {seconds:.0f} s for them" if seconds >= 1.0 else ""
-        lines.append(f"{films.made} films made{waited}")
+        lines.append(f"{counted(films.made, 'film')} made{waited}")
     if films.failed:
         lines.append(f"warning: {films.failed} films could not be made: {films.troubles[0]}")
-    if films.stopped and films.pending:
-        lines.append(
-            f"warning: {films.pending} films are still to be made ({films.stopped}): "
-            f"{how_to_film(films.config.folder)}"
-        )
+    if films.pending:
+        warning, why = ("warning: ", f" ({films.stopped})") if films.stopped else ("", "")
+        how = how_to_film(films.config.folder)
+        lines.append(f"{warning}{counted(films.pending, 'film')} still to be made{why}: {how}")
     return lines
 
 

@@ -248,6 +248,8 @@ def test_failures_are_filmed_by_processes_and_what_is_missing_by_the_next_resume
     assert {record.video for record in read_records(tmp_path).values()} == set(names(tmp_path))
     assert "2 films made" in capsys.readouterr().err
     (tmp_path / film_name(KEYS[1])).unlink()
+    evaluate(replace(asked, resume=True, after_trials=lambda: False))
+    assert "1 film still to be made: `robospa report" in capsys.readouterr().err
     evaluate(replace(asked, resume=True))
     assert len(names(tmp_path)) == 2
 
@@ -290,7 +292,7 @@ def test_a_filming_that_fails_loses_no_record_and_is_one_sentence(
     assert len(read_records(tmp_path)) == 2
     said = capsys.readouterr().err.splitlines()
     (line,) = [text for text in said if text.startswith("warning: ")]
-    assert "2 films are still to be made (cannot write" in line
+    assert "2 films still to be made (cannot write" in line
 
 
 def test_scores_are_shown_although_films_are_missing(
@@ -299,13 +301,15 @@ def test_scores_are_shown_although_films_are_missing(
     make_run(tmp_path, RECORDS)
 
     def interrupted(asked: Request) -> None:
+        asked.after_trials()
+        assert "Pick It" in capsys.readouterr().out  # before anybody waits for films
         raise FilmsInterrupted("3 films are still to be made")
 
     monkeypatch.setattr(command, "run_request", interrupted)
     with pytest.raises(typer.Exit) as ended:
         command.run_and_show(request(tmp_path))
     out, err = capsys.readouterr()
-    assert ended.value.exit_code == 130 and "Pick It" in out
+    assert ended.value.exit_code == 130 and out == ""
     assert err == "robospa: interrupted after the last trial; 3 films are still to be made\n"
 
 
