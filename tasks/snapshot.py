@@ -100,13 +100,13 @@ def snapshot_from_json(data: Mapping[str, Any], grippers: tuple[Gripper, Gripper
     KeyError or ValueError if it is none.
     """
     left, right = data["end_effector"]
-    ends = (_pose(left), _pose(right))
+    ends = (pose_of_row(left), pose_of_row(right))
     grip_left, grip_right = data["gripper"]
     joints_left, joints_right = data["joints"]
     measured_left, measured_right = data["measured"]
     return Snapshot(
         time=float(data["time"]),
-        poses={name: _pose(row) for name, row in data["poses"].items()},
+        poses={name: pose_of_row(row) for name, row in data["poses"].items()},
         gripper=(float(grip_left), float(grip_right)),
         end_effector=ends,
         grasp_points=grasp_points(grippers, ends),
@@ -124,6 +124,7 @@ def _floats(row: Iterable[float]) -> tuple[float, ...]:
     return tuple(float(v) for v in row)
 
 
-def _pose(row: Iterable[float]) -> Pose:
+def pose_of_row(row: Iterable[float]) -> Pose:
+    """The pose that is x, y, z [m], qw, qx, qy, qz."""
     x, y, z, qw, qx, qy, qz = _floats(row)
     return Pose((x, y, z), (qw, qx, qy, qz))

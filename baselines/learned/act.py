@@ -22,14 +22,14 @@ from robospa.geometry import Pose, rotate
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills.pick import world_grasps
-from robospa.observation import FEATURES, SLOTS, Observation
+from robospa.observation import KIND_BITS, SLOTS, Observation
 from robospa.tasks import plan as calls
 from robospa.tasks.environment_state import kind_code
 from robospa.tasks.families import memory
 from robospa.tasks.families.dustbin import ROOM, discard, exchange_place
 from robospa.tasks.scene import Scene, SceneObject
-from robospa.tasks.snapshot import Snapshot
-from robospa.workcell import TABLE_TOP, grasp_points
+from robospa.tasks.snapshot import Snapshot, pose_of_row, snapshot_from_json
+from robospa.workcell import TABLE_TOP
 
 Rows = NDArray[np.float32]
 NEAR_HOME = 0.2
@@ -65,24 +65,19 @@ LIFT, RISE = 0.08, 0.11
 def told(observation: Observation) -> list[Seen]:
     """The objects of an environment state: what a perfect eye would see."""
     codes = {tuple(kind_code(kind)): kind for kind in steps.KINDS}
-    rows, found = observation["environment_state"].astype(float), []
-    for numbers in rows.reshape(SLOTS, len(FEATURES)).tolist():
-        of = dict(zip(FEATURES, numbers, strict=True))
-        if of["present"]:
-            kind = codes[tuple(numbers[-12:])]
-            half = (of["half_x"], of["half_y"], of["half_z"])
-            low = of["z"] - (half[2] if kind == "block" else 0.0)
-            turn = math.atan2(of["sin_yaw"], of["cos_yaw"])
-            color = (of["red"], of["green"], of["blue"])
-            found.append(Seen(kind, (of["x"], of["y"], low), half, turn, color, of["hinge"]))
+    rows, found = observation["environment_state"].astype(float).reshape(SLOTS, -1), []
+    for row in rows[rows[:, 0] > 0].tolist():
+        kind = codes[tuple(row[-KIND_BITS:])]
+        _, x, y, z, cos, sin, *_, a, b, c, red, green, blue, hinge = row[:-KIND_BITS]
+        place = (x, y, z - (c if kind == "block" else 0.0))
+        turn = math.atan2(sin, cos)
+        found.append(Seen(kind, place, (a, b, c), turn, (red, green, blue), hinge))
     return found
 
 
 NEEDS = {"hang": ("handle", "hang"), "hit": ("head", "press")}
 """The frames that object and destination of a step of a type must have."""
 ONTO = {"dock": calls.Dock, "hang": calls.Hang, "pour": calls.Pour}
-ALONE = ("pick", "press", "open", "lift", "back", "move")
-"""Types of steps that need no destination."""
 
 
 def imagined(item: Tracked) -> bool:
@@ -100,7 +95,7 @@ def possible(step: Step, state: State) -> bool:
     if not all(imagined(item) for item in named):
         return False
     if step.destination is None:
-        return step.type in ALONE and (step.type != "move" or step.place is not None)
+        return step.type not in steps.WITH_GOAL or step.place is not None
     own, other = NEEDS.get(step.type, ("support", "support"))
     things = (state.objects[step.object].now, state.objects[step.destination].now)
     return own in steps.model(things[0]).frames and other in steps.model(things[1]).frames
@@ -109,10 +104,8 @@ def possible(step: Step, state: State) -> bool:
 def calls_of(same: Sequence[Step], state: State, scene: Scene) -> list[object]:
     """The skill calls that do the `same` steps, one after the other, in the imagined scene."""
     step, count = same[0], len(same)
-    if step.type == "wait":
-        return [calls.Wait(WAIT)]
     if step.object is None:
-        return []
+        return [calls.Wait(WAIT)] if step.type == "wait" else []
     name, item = str(step.object), state.objects[step.object]
     on = "" if step.destination is None else str(step.destination)
 
@@ -121,7 +114,7 @@ def calls_of(same: Sequence[Step], state: State, scene: Scene) -> list[object]:
 
     match step.type:
         case "pick":
-            return [calls.Pick(name, steps.HELD)]
+            return [calls.Pick(name)]
         case "press":
             pressed = [s.object for s in same if s.object is not None]
             return [calls.Press(str(number), arm=side(number)) for number in pressed]
@@ -133,49 +126,39 @@ def calls_of(same: Sequence[Step], state: State, scene: Scene) -> list[object]:
             return [calls.Hit(name, tuple(str(s.destination) for s in same))]
         case "open":
             return [calls.Open(name)]
+        case "lift" if item.now.kind == "kitchen_pot":
+            return [calls.RaiseLower(name, RISE, count, ARMS)]
         case "lift":
-            if item.now.kind == "kitchen_pot":
-                return [calls.RaiseLower(name, RISE, count, ARMS)]
             return [calls.RaiseLower(name, LIFT, count, (side(step.object),))]
         case "drop":
             place = exchange_place(steps.taken(state, step.object, ROOM))
             return list(discard(scene, name, on, place))
-        case "turn" | "back" | "move":
-            return _moved(step, state)
-    return []
+    return _moved(step, state)
 
 
 def _moved(step: Step, state: State) -> list[object]:
     assert step.object is not None
     name, item = str(step.object), state.objects[step.object]
-    low = -steps.model(item.now).bottom
-    if step.type == "back":
-        x, y, z = item.first.place
-        return [calls.Pick(name, RISE), calls.Place(name, (x, y, z + low))]
-    if step.type == "turn" and step.destination is not None:
-        x, y, z = item.first.place
-        quarters = round(state.objects[step.destination].first.turn / (math.pi / 2))
-        goal = quarters * math.pi / 2
-        half = math.cos(goal - item.now.turn) < -0.7 and abs(x) < TURN_AT_ONCE
-        ways = [goal - math.pi / 2, goal] if half else [goal]
-        return [
-            call
-            for yaw in ways
-            for call in (calls.Pick(name, LIFT), calls.Place(name, (x, y, z + low), yaw=yaw))
-        ]
-    if step.destination is not None:
-        goal_now = state.objects[step.destination].now
-        frames = steps.model(goal_now).frames
-        top = goal_now.place[2] + 2 * goal_now.half[2] - steps.table_below(state.objects)
+    goal = None if step.destination is None else state.objects[step.destination]
+    (x, y, z), low = item.first.place, -steps.model(item.now).bottom
+    lift, yaws = RISE if step.type == "back" else LIFT, list[float | None]([None])
+    if step.type == "turn" and goal is not None:
+        yaw = round(goal.first.turn / (math.pi / 2)) * math.pi / 2
+        half = math.cos(yaw - item.now.turn) < -0.7 and abs(x) < TURN_AT_ONCE
+        yaws = [yaw - math.pi / 2, yaw] if half else [yaw]
+    elif goal is not None:
+        frames = steps.model(goal.now).frames
+        top = goal.now.place[2] + 2 * goal.now.half[2] - steps.table_below(state.objects)
         up = 0.0
-        if item.now.kind == "bowl" == goal_now.kind:
+        if item.now.kind == "bowl" == goal.now.kind:
             up = frames["nest"].position[2] - frames["support"].position[2]
-        drop = 0.02 if goal_now.kind == "bread_basket" else 0.003
+        drop = 0.02 if goal.now.kind == "bread_basket" else calls.Place.drop
         on = calls.Place(name, (0.0, 0.0, up), on=str(step.destination), drop=drop)
         return [calls.Pick(name, max(LIFT, min(0.16, top + 0.06))), on]
-    assert step.place is not None
-    z = steps.support_height(state.objects, step.place, item.now)
-    return [calls.Pick(name, LIFT), calls.Place(name, (*step.place, z + low))]
+    elif step.place is not None:
+        (x, y), z = step.place, steps.support_height(state.objects, step.place, item.now)
+    pairs = ((calls.Pick(name, lift), calls.Place(name, (x, y, z + low), yaw=a)) for a in yaws)
+    return [call for pair in pairs for call in pair]
 
 
 @dataclass
@@ -215,7 +198,7 @@ def wall_before(lost: Sequence[Seen], seen: Sequence[Seen]) -> list[Seen]:
 class Belief:
     """Where all objects of a trial are, by what was seen and by what the arms did since."""
 
-    def __init__(self, robot: Embodiment, seen: Sequence[Seen]) -> None:
+    def __init__(self, robot: Embodiment, seen: Sequence[Seen], state: Rows) -> None:
         self.robot = robot
         self.chains = [chain_of(arm) for arm in robot.arms]
         self.columns = robot.action_space("joint").arms
@@ -223,8 +206,8 @@ class Belief:
         self.state = State(tuple(Tracked(one, one) for one in seen))
         self.poses = [steps.pose_of(one) for one in seen]
         self.held: list[Grip | None] = [None, None]
-        self.last: Rows | None = None
-        """What was commanded last (D,)."""
+        self.last = state
+        """What was commanded last (D,), or the first state."""
 
     def scene(self) -> Scene:
         """The imagined scene; objects are called by their numbers."""
@@ -238,29 +221,23 @@ class Belief:
 
     def snapshot(self, observation: Observation, scene: Scene) -> Snapshot:
         """This instant, as imagined."""
-        ends = tuple(_pose(row) for row in observation["ee"].astype(float).tolist())
-        measured = observation["state"].astype(float)
-        last = measured if self.last is None else self.last.astype(float)
-        left, right = (
-            [tuple(row[c.body].tolist()) for c in self.columns] for row in (last, measured)
-        )
+        data = {
+            "time": 0.0,
+            "poses": {},
+            "gripper": [self.last[c.gripper] for c in self.columns],
+            "end_effector": observation["ee"][:, :7],
+            "joints": [self.last[c.body] for c in self.columns],
+            "measured": [observation["state"][c.body] for c in self.columns],
+        }
         numbers = {item.name: int(item.name) for item in scene.objects}
-        pair = (ends[0], ends[1])
-        return Snapshot(
-            time=0.0,
+        return replace(
+            snapshot_from_json(data, self.robot.grippers),
             poses={name: self.poses[i] for name, i in numbers.items()},
-            gripper=(float(last[self.columns[0].gripper]), float(last[self.columns[1].gripper])),
-            end_effector=pair,
-            grasp_points=grasp_points(self.robot.grippers, pair),
-            joints=(left[0], left[1]),
-            measured=(right[0], right[1]),
             hinges={name: self.state.objects[i].now.hinge for name, i in numbers.items()},
         )
 
     def out_of_the_way(self) -> bool:
         """Whether no arm is over the table: no picture that was learned from shows one there."""
-        if self.last is None:
-            return True
         return all(
             np.abs(self.last[c.body] - np.array(arm.home)).max() < NEAR_HOME
             for c, arm in zip(self.columns, self.robot.arms, strict=True)
@@ -270,24 +247,22 @@ class Belief:
 
     def advance(self, rows: Rows, target: int | None, observation: Observation) -> None:
         """Take over what commanded `rows` (T, D) did with object number `target`."""
-        before = observation["state"] if self.last is None else self.last
         for row in rows:
             for arm, c in enumerate(self.columns):
-                old, new = float(before[c.gripper]), float(row[c.gripper])
+                old, new = float(self.last[c.gripper]), float(row[c.gripper])
                 if self.held[arm] is None and new < SHUT < old and target is not None:
                     self._close(arm, row, target)
                 elif (hold := self.held[arm]) is not None and new > old + 0.02:
                     self.put(hold.number, FALLEN * self._end(arm, row) * hold.offset)
                     self.held[arm] = None
-            before = row
-        self.last = before
+            self.last = row
         empty = {h.number for arm, h in enumerate(self.held) if h and self._shut(arm, observation)}
         for arm, hold in enumerate(self.held):
             if hold is not None and hold.number in empty:
                 self.put(hold.number, hold.before)
                 self.held[arm] = None
             elif hold is not None:
-                end = _pose(observation["ee"][arm].astype(float).tolist())
+                end = pose_of_row(observation["ee"][arm, :7])
                 self.put(hold.number, end * hold.offset)
 
     def _shut(self, arm: int, observation: Observation) -> bool:
@@ -398,8 +373,3 @@ def _seen_again(believed: Seen, seen: Seen, piled: bool) -> Seen:
         (ax, ay, az), (bx, by, bz) = believed.place, place
         place = ((ax + bx) / 2, (ay + by) / 2, (az + bz) / 2)
     return replace(believed, place=place, turn=seen.turn, hinge=seen.hinge)
-
-
-def _pose(row: Sequence[float]) -> Pose:
-    x, y, z, qw, qx, qy, qz = row[:7]
-    return Pose((x, y, z), (qw, qx, qy, qz))

@@ -29,7 +29,6 @@ from robospa.tasks.families.dustbin import BIN
 from robospa.tasks.objects import object_model
 from robospa.workcell import HEIGHT, TABLE_TOP, WIDTH, WORKCELL
 
-WEIGHTS = Path(__file__).parent / "weights"
 CELL = 8
 """Pixels along a side of the cells in which middles are looked for."""
 SHIFTS = (0, CELL // 2)
@@ -108,17 +107,20 @@ def as_input(images: NDArray[np.uint8]) -> Tensor:
     return torch.from_numpy(images.astype(np.float32) / 255 - 0.5).permute(0, 3, 1, 2)
 
 
-def around(image: NDArray[np.uint8], pixels: NDArray[np.int64]) -> NDArray[np.uint8]:
-    """(K, AROUND, AROUND, 6): what is around pixels (K, 2: column, row), sharp and from afar."""
-    size = 2 * AROUND
+def around(
+    image: NDArray[np.uint8], places: NDArray[np.float64]
+) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+    """What is around places (K, 2: column, row) [px], sharp and from afar (K, AROUND, AROUND, 6);
+    and the pixels that it is around (K, 2), the nearest in the picture."""
+    pixels = places.round().clip(0, [WIDTH - 1, HEIGHT - 1]).astype(np.int64)
+    size, half = 2 * AROUND, AROUND // 2
     padded = np.pad(image, ((AROUND, AROUND), (AROUND, AROUND), (0, 0)), mode="edge")
     made = np.empty((len(pixels), AROUND, AROUND, 6), np.uint8)
-    half = AROUND // 2
     for i, (u, v) in enumerate(pixels):
         wide = padded[v : v + size, u : u + size]
         made[i, ..., :3] = wide[half : half + AROUND, half : half + AROUND]
         made[i, ..., 3:] = wide.reshape(AROUND, 2, AROUND, 2, 3).mean(axis=(1, 3))
-    return made
+    return made, pixels
 
 
 def table_place(pixels: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -210,7 +212,7 @@ def find_losses(
     cells = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=2) + 0.5
     right, near = np.zeros(told.shape, np.float32), np.zeros((len(images), 1, rows, columns))
     for i, items in enumerate(seen):
-        ways = np.stack(middle_pixel(items), axis=1) / CELL - cells[:, :, None]
+        ways = middle_pixel(items) / CELL - cells[:, :, None]
         far = np.abs(ways).max(axis=3)
         nearest = far.argmin(axis=2)[..., None]
         way = np.take_along_axis(ways, nearest[..., None], axis=2)[:, :, 0]
@@ -235,9 +237,9 @@ def measure_losses(
     """Of measuring what is `seen` in pictures, looked at a little beside its middle."""
     crops, every = [], []
     for image, items in zip(images, seen, strict=True):
-        pixels = np.stack(middle_pixel(items), axis=1) + rng.normal(0, 1.2, (len(items), 2))
-        near = pixels.round().clip(0, [WIDTH - 1, HEIGHT - 1]).astype(np.int64)
-        crops.append(around(image, near))
+        pixels = middle_pixel(items) + rng.normal(0, 1.2, (len(items), 2))
+        crop, near = around(image, pixels)
+        crops.append(crop)
         every.append(near)
     where, rows = np.concatenate(every), np.concatenate(seen)
     inputs = as_input(np.concatenate(crops)).contiguous(memory_format=torch.channels_last)
@@ -274,10 +276,12 @@ def load_weights(network: nn.Module, path: Path) -> None:
 
 
 class Perceiver:
-    """Says what a picture shows."""
+    """Says what a picture shows, with the weights in `folder`."""
 
-    def __init__(self, find: FindNetwork, measure: MeasureNetwork) -> None:
-        self._find, self._measure = find.eval(), measure.eval()
+    def __init__(self, folder: Path) -> None:
+        self._find, self._measure = FindNetwork(), MeasureNetwork()
+        load_weights(self._find, folder / "find.npz")
+        load_weights(self._measure, folder / "measure.npz")
 
     def look(self, image: NDArray[np.uint8]) -> list[Seen]:
         """The objects in a head picture (H, W, 3), the surest first."""
@@ -285,12 +289,8 @@ class Perceiver:
             shifted = [np.pad(image, ((n, 0), (n, 0), (0, 0)), "edge") for n in SHIFTS]
             views = np.stack([one[: image.shape[0], : image.shape[1]] for one in shifted])
             found, rises = self._find(as_input(views))
-            pixels = middles(found.double().numpy())
-            if not len(pixels):
-                return []
-            near = pixels.round().clip(0, [WIDTH - 1, HEIGHT - 1]).astype(np.int64)
-            crops = as_input(around(image, near))
-            told = self._measure(crops, torch.from_numpy(near.astype(np.float32)))
+            crops, near = around(image, middles(found.double().numpy()))
+            told = self._measure(as_input(crops), torch.from_numpy(near.astype(np.float32)))
         seen = seen_of(told.double().numpy(), near.astype(np.float64))
         return standing(seen, TABLE_TOP + UNIT * float(rises[0]))
 
@@ -312,11 +312,3 @@ def middles(told: NDArray[np.float64]) -> NDArray[np.float64]:
             found, total = np.vstack([found, places[k]]), np.append(total, shares[k])
     kept = np.argsort(-total, kind="stable")
     return np.asarray(found[kept][total[kept] > LIKELY])
-
-
-def load(folder: Path | None = None) -> Perceiver:
-    """The perceiver whose weights lie in `folder`; the one that is shipped for None."""
-    networks = FindNetwork(), MeasureNetwork()
-    for network, name in zip(networks, ("find", "measure"), strict=True):
-        load_weights(network, (folder or WEIGHTS) / f"{name}.npz")
-    return Perceiver(*networks)

@@ -29,14 +29,14 @@ from torch.nn import functional as F
 from torch.nn.utils.rnn import pad_sequence
 
 from robospa.baselines.learned.perceive import load_weights
-from robospa.baselines.learned.scenes import NOTHING, SEEN_WIDTH, TOKEN_WIDTH, tokens_of
-from robospa.baselines.learned.steps import KINDS, TYPES, State, Step, taken
+from robospa.baselines.learned.scenes import SEEN_WIDTH, TOKEN_WIDTH, last_of, tokens_of
+from robospa.baselines.learned.steps import KINDS, TYPES, WEIGHTS, WITH_GOAL, State, Step, taken
 from robospa.tasks.colors import NAMED
 from robospa.workcell import TABLE_TOP
 
 WORD = re.compile(r"[a-z]+|[0-9]")
 EMPTY, UNKNOWN, FIRST_WORD = 0, 1, 2
-PIECES, MEANING = Path(__file__).parent / "weights" / "pieces.npz", 128
+PIECES, MEANING = WEIGHTS / "pieces.npz", 128
 LONGEST = 64
 """Words of a sentence that are read."""
 COUNTED = 24
@@ -52,8 +52,6 @@ CELL, ORIGIN, GRID = 0.01, (-0.40, -0.34), (80, 64)
 """The heat map: the size of its cells [m], its corner, and cells along x and y."""
 FEATURES, RELATIONS, WAVES = 19, 11, 13
 """Numbers of an object, of a pair of objects, and of a length."""
-WITH_GOAL = ("move", "turn", "drop", "stamp", "dock", "hang", "hit", "pour")
-"""Types of steps that have a destination; to move is also to move to a place."""
 
 
 def words_of(sentence: str) -> list[str]:
@@ -398,21 +396,22 @@ def batch_of(
 
 
 class Pointer:
-    """Decides the next step."""
+    """Decides the next step, with the weights in `folder`."""
 
-    def __init__(self, network: PointNetwork, vocabulary: Vocabulary) -> None:
-        self._network, self._vocabulary = network, vocabulary
+    def __init__(self, folder: Path) -> None:
+        self._vocabulary = Vocabulary(json.loads((folder / "words.json").read_text()))
+        self._network = PointNetwork(FIRST_WORD + len(self._vocabulary.words))
+        load_weights(self._network, folder / "point.npz")
 
     def next_step(self, state: State, sentence: str) -> Step:
         """What is most liked: a type, then an object for it, then where to, if nothing is there."""
         if not state.objects:
             return Step("done")
-        last = TYPES.index(state.done[-1].type) if state.done else NOTHING
         batch = batch_of(
             [tokens_of(state)],
             self._vocabulary.numbers(sentence)[None],
             self._vocabulary.meanings(sentence)[None],
-            np.array([[len(state.done), last]], np.int64),
+            np.array([last_of(state)], np.int64),
         )
         with torch.inference_mode():
             told = self._network(batch)
@@ -431,11 +430,3 @@ class Pointer:
                 heat[np.hypot(*(cell_places() - place).T) < far] = LOW
             x, y = cell_places()[int(heat.argmax())].tolist()
             return Step(name, number, None, (x, y))
-
-
-def load(folder: Path) -> Pointer:
-    """The pointer whose weights lie in `folder`."""
-    vocabulary = Vocabulary(json.loads((folder / "words.json").read_text()))
-    network = PointNetwork(FIRST_WORD + len(vocabulary.words))
-    load_weights(network, folder / "point.npz")
-    return Pointer(network, vocabulary)

@@ -18,12 +18,13 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from robospa.baselines.learned import act
+from robospa.baselines.learned import act, steps
 from robospa.baselines.learned.act import Belief, Rows
-from robospa.baselines.learned.steps import MIDDLE, Seen, State, Step, after, pixel, pose_of
+from robospa.baselines.learned.steps import Seen, State, Step, after
 from robospa.extras import need
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.embodiment import Embodiment
@@ -38,21 +39,24 @@ Look = Callable[[Observation], list[Seen]]
 """What is seen in an observation."""
 Call = dict[str, object]
 """A call of a skill (`robospa.protocol.calls`)."""
+Answer = Rows | list[Call]
+"""Actions (T, D), or calls."""
 INSIDE = (0.5, 0.3, 2.0)
 """Where a bin beside the table is pointed at, of which the far side of its mouth is seen: in halves
 of its box from the middle of its underside."""
-NAMES = {"RaiseLower": "raise_lower"}
+NAMES = {"raiselower": "raise_lower"}
 Decide = Callable[[State, str], Step]
 """The next step, from all that is known and the sentence."""
-REPEATED = ("press", "lift", "stamp", "hit")
-"""Steps of which several are done in one go: between them nothing is to be seen."""
+REPEATED: dict[str, dict[str, Any]]
+REPEATED = {"press": {"object": None}, "hit": {"destination": None}, "lift": {}, "stamp": {}}
+"""Steps of which several are done in one go, between which nothing is to be seen, and in what these
+may differ."""
 AT_ONCE, TRIES = 30, 3
 IDLE = 10
 """Actions of an answer that holds still, where nothing more is to be done."""
-ARRIVED = {"move": 0.025, "back": 0.025, "dock": 0.05, "hang": 0.06}
-"""How far [m] from its place something may be after a step of a type."""
-TURNED = 0.6
-"""How far off [rad] a turn by quarters may seem."""
+OFF = {"move": 0.025, "back": 0.025, "dock": 0.05, "hang": 0.06, "drop": 0.3, "turn": 0.6}
+"""How far [m; of a turn by quarters: rad] from its place something may seem after a step of a type,
+in a bin whatever its height."""
 
 
 class Learned:
@@ -69,68 +73,60 @@ class Learned:
         self.belief: Belief | None = None
         self._expert: Expert | None = None
         self._steps: list[Step] = []
-        self._rows: Rows | None = None
         self._tries = 0
+        self._answer: Any = None
         self.log: list[tuple[Step, str]] = []
         """Every step that was tried, and what came of it."""
 
-    def infer(self, observation: Observation) -> Rows:
-        """The next actions, float32 (T, D)."""
+    def infer(self, observation: Observation) -> Answer:
+        """The next actions, float32 (T, D), or the calls of the next steps."""
         if self._robot is None:
             raise RuntimeError("the policy was asked for actions before a reset")
         if self.belief is None:
-            self.belief = Belief(self._robot, self._look(observation))
-        elif self._rows is not None:
-            target = self._steps[0].object if self._steps else None
-            self.belief.advance(self._rows, target, observation)
-            if self.belief.out_of_the_way():
-                waiting = bool(self._steps) and self._steps[0].type == "wait"
-                self.belief.look(self._look(observation), waiting)
-        self._rows = self._next_rows(self.belief, observation)
-        return self._rows
+            self.belief = Belief(self._robot, self._look(observation), observation["state"])
+        else:
+            self._take_over(self.belief, observation)
+        self._answer = answer = self._next(self.belief, observation)
+        return answer
 
-    def _next_rows(self, belief: Belief, observation: Observation) -> Rows:
-        while True:
+    def _take_over(self, belief: Belief, observation: Observation) -> None:
+        """What came of the last answer."""
+        belief.advance(self._answer, self._steps[0].object, observation)
+        if belief.out_of_the_way():
+            belief.look(self._look(observation), self._steps[0].type == "wait")
+
+    def _next(self, belief: Belief, observation: Observation) -> Answer:
+        while self._expert is not None or (found := self._decided(belief)):
             if self._expert is None:
-                self._begin(belief, observation)
-            if self._expert is None:
-                break
+                self._expert = Expert(self._scene, belief.snapshot(observation, self._scene), found)
+                held = [None if hold is None else str(hold.number) for hold in belief.held]
+                self._expert.workspace.held = held
             rows = self._expert.next(belief.snapshot(observation, self._scene))
             if not self._expert.finished:
                 return rows
             self._end(belief, self._expert.failures)
             self._expert = None
-        last = observation["state"] if belief.last is None else belief.last
-        return np.repeat(np.asarray(last, np.float32)[None], IDLE, axis=0)
-
-    def _begin(self, belief: Belief, observation: Observation) -> None:
-        """Decide what is next; nothing if all is done."""
-        found = self._decided(belief)
-        if not found:
-            return
-        self._scene = belief.scene()
-        snapshot = belief.snapshot(observation, self._scene)
-        self._expert = Expert(self._scene, snapshot, found)
-        held = [None if hold is None else str(hold.number) for hold in belief.held]
-        self._expert.workspace.held = held
+        return np.repeat(belief.last[None], IDLE, axis=0)
 
     def _decided(self, belief: Belief) -> list[object]:
         """What is done next, in a plan's calls: new steps, or those that failed once more."""
         if self._tries == 0 or not all(act.possible(step, belief.state) for step in self._steps):
             self._tries, self._steps = 0, self._chain(belief.state)  # what it was about is gone
-        return act.calls_of(self._steps, belief.state, belief.scene())
+        self._scene = belief.scene()
+        return act.calls_of(self._steps, belief.state, self._scene)
 
     def _chain(self, state: State) -> list[Step]:
-        steps = [self._next(state)]
-        while steps[0].type in REPEATED and len(steps) < AT_ONCE:
-            state = after(state, steps[-1])
-            more = self._next(state)
-            if more.type != steps[0].type or not _alike(more, steps[0]):
+        """The next step, and those that are done in one go with it."""
+        chain = [first := self._decided_step(state)]
+        while (loose := REPEATED.get(first.type)) is not None and len(chain) < AT_ONCE:
+            state = after(state, chain[-1])
+            more = self._decided_step(state)
+            if replace(more, **loose) != replace(first, **loose):
                 break
-            steps.append(more)
-        return steps
+            chain.append(more)
+        return chain
 
-    def _next(self, state: State) -> Step:
+    def _decided_step(self, state: State) -> Step:
         """The next step; done where that is nothing that can be tried, and after a pick: whoever is
         asked to pick is asked for nothing else."""
         picked = bool(state.done) and state.done[-1].type == "pick"
@@ -157,53 +153,39 @@ class Learned:
         if step.object is None:
             return ""
         state = belief.state
-        item, want = state.objects[step.object], after(state, step).objects[step.object]
-        held = any(hold is not None and hold.number == step.object for hold in belief.held)
+        item, want = state.objects[step.object], after(state, step).objects[step.object].now
         if step.type == "pick":
+            held = any(hold is not None and hold.number == step.object for hold in belief.held)
             return "" if held else "not held"
-        if step.type in ARRIVED and item.visible:
-            off = math.dist(item.now.place, want.now.place)
-            return "" if off < ARRIVED[step.type] else f"{off:.3f} m off"
-        if step.type == "turn" and item.visible:
-            off = abs(math.remainder(item.now.turn - want.now.turn, 2 * math.pi))
-            return "" if off < TURNED else f"{off:.2f} rad off"
-        if step.type == "drop" and step.destination is not None:
-            away = math.dist(item.now.place[:2], want.now.place[:2])
-            return "still outside" if item.visible and away > 0.3 else ""
-        return ""
+        if step.type not in OFF or not item.visible:
+            return ""
+        off = math.dist(*(one.place[: 2 if step.type == "drop" else 3] for one in (item.now, want)))
+        if step.type == "turn":
+            off = abs(math.remainder(item.now.turn - want.turn, 2 * math.pi))
+        return "" if off < OFF[step.type] else f"{off:.3f} off"
 
 
 class LearnedCalls(Learned):
     """The same in calls of skills, which point at what it sees: it decides, and does not act."""
 
-    _said = 0
-
-    def infer(self, observation: Observation) -> list[Call]:  # type: ignore[override]
-        """The calls of the next steps."""
-        if self._robot is None:
-            raise RuntimeError("the policy was asked for calls before a reset")
-        seen = self._look(observation)
-        if self.belief is None:
-            self.belief = Belief(self._robot, seen)
-        elif self._steps:
-            self._take_over(self.belief, observation["calls"][-self._said :], seen)
-        found = in_points(self._decided(self.belief), self.belief.state)
-        self._said = len(found)
+    def _next(self, belief: Belief, observation: Observation) -> Answer:
+        found = in_points(self._decided(belief), belief.state)
         if self.spec.action == POINT:
             at = [call["at"] for call in found if "at" in call] or [(0.5, 0.5)]
             return [{"skill": POINT, "at": at[0]}]
         return found or [{"skill": "done"}]
 
-    def _take_over(self, belief: Belief, said: Sequence[Call], seen: list[Seen]) -> None:
-        """What came of the calls `said`, by their feedback and by what is seen."""
+    def _take_over(self, belief: Belief, observation: Observation) -> None:
+        """What came of the calls of the last answer, by their feedback and by what is seen."""
+        said = observation["calls"][-len(self._answer) :]
         failures = [str(call["feedback"]) for call in said if call["feedback"] != "done"]
         before = state = belief.state
         for step in self._steps if not failures else ():
             state = after(state, step)
         for number, (old, new) in enumerate(zip(before.objects, state.objects, strict=True)):
             if old.now != new.now:
-                belief.put(number, pose_of(new.now))
-        belief.look(seen, self._steps[0].type == "wait")
+                belief.put(number, steps.pose_of(new.now))
+        belief.look(self._look(observation), self._steps[0].type == "wait")
         self._end(belief, failures)
 
     def _missed(self, belief: Belief, step: Step) -> str:
@@ -212,50 +194,37 @@ class LearnedCalls(Learned):
 
 def in_points(found: Sequence[object], state: State) -> list[Call]:
     """A plan's calls on objects named by number as calls at the pixels where these are seen."""
-    at: dict[str, tuple[float, float]] = {}
-    lies: dict[str, tuple[float, float, float]] = {}
-    for number, item in enumerate(state.objects):
-        x, y, z = item.now.place
-        lies[str(number)] = (x, y, item.now.turn)
-        shares = MIDDLE if z > TABLE_TOP - 0.1 else INSIDE
-        u, v = pixel(item.now, shares)
-        at[str(number)] = (min(max(u / WIDTH, 0), 1), min(max(v / HEIGHT, 0), 1))
-    said: list[Call] = []
+    things = {str(number): item.now for number, item in enumerate(state.objects)}
+    lies, said = dict(things), list[Call]()
+
+    def at(name: str) -> tuple[float, float]:
+        one = things[name]
+        u, v = steps.pixel(one, steps.MIDDLE if one.place[2] > TABLE_TOP - 0.1 else INSIDE)
+        return min(max(u / WIDTH, 0), 1), min(max(v / HEIGHT, 0), 1)
+
     for call in found:
-        given = vars(call)
-        own = str(given.get("object", given.get("tool", "")))
-        name = NAMES.get(type(call).__name__, type(call).__name__.lower())
-        one: Call = {"skill": name}
+        given, (own, goals) = vars(call), steps.named(call)
+        name = type(call).__name__.lower()
+        one: Call = {"skill": NAMES.get(name, name)}
         one |= {key: given[key] for key in ("arm", "arms", "seconds", "times") if given.get(key)}
-        goal = given.get("on") or given.get("into")
+        points = [at(goal) for goal in goals if goal]
         if own:
-            one["at"] = at[own]
+            one["at"] = at(own)
+        if points:
+            put = isinstance(call, calls.Place | calls.Drop)
+            one |= {"at": points[0]} if put else {"to": points}
         if isinstance(call, calls.Place):
             one["height"] = call.drop
-            if goal is None:  # beside where it lies
-                x, y, turn = lies[own]
+            if call.on is None:  # beside where it lies
+                (x, y, z), turn = lies[call.object].place, lies[call.object].turn
                 one["offset"] = (call.position[0] - x, call.position[1] - y)
                 if call.yaw is not None:
                     one["turn"] = math.degrees(math.remainder(call.yaw - turn, 2 * math.pi))
-                lies[own] = (*call.position[:2], turn if call.yaw is None else call.yaw)
-        if isinstance(call, calls.Place | calls.Drop):
-            one["at"] = at[str(goal or own)]
-        elif goal is not None:
-            one["to"] = at[str(goal)]
-        elif isinstance(call, calls.Hit):
-            one["to"] = [at[target] for target in call.targets]
+                    turn = call.yaw
+                now = (*call.position[:2], z)
+                lies[call.object] = replace(lies[call.object], place=now, turn=turn)
         said.append(one)
     return said
-
-
-def _alike(one: Step, other: Step) -> bool:
-    """Whether both steps are done in one go."""
-    same = one.type != "stamp" or one.destination == other.destination
-    return one.type == "press" or (one.object == other.object and same)
-
-
-WEIGHTS = Path(__file__).parent / "weights"
-"""What is served where no other folder is named."""
 
 
 @dataclass(frozen=True)
@@ -272,7 +241,7 @@ class Learners:
 
     def __init__(self, options: LearnedOptions) -> None:
         """Raises FileNotFoundError for a folder without weights."""
-        folder = Path(options.path).expanduser() if options.path else WEIGHTS
+        folder = Path(options.path).expanduser() if options.path else steps.WEIGHTS
         if not folder.is_dir() or not any(folder.iterdir()):
             raise FileNotFoundError(f"{folder} has no weights: robospa learn {folder} makes some")
         torch = need("torch")
@@ -280,10 +249,10 @@ class Learners:
 
         torch.set_num_threads(1)  # so that neighbours on the machine change nothing
         files = [path.read_bytes() for path in sorted(folder.glob("*.npz"))]
-        self._decide: Decide = point.load(folder).next_step
+        self._decide: Decide = point.Pointer(folder).next_step
         self._look: Look = act.told
         if options.eyes:
-            eyes = perceive.load(folder)
+            eyes = perceive.Perceiver(folder)
             self._look = lambda observation: eyes.look(observation["images"]["head"])
         self._kind = Learned if options.action == "joint" else LearnedCalls
         self.spec = PolicySpec(

@@ -9,6 +9,7 @@ that a making that was cut short goes on where it was.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from io import BytesIO
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 from robospa.action_space import ARMS
 from robospa.baselines.learned import steps
 from robospa.baselines.learned.steps import KINDS, TYPES, Seen, State, Step, Tracked
-from robospa.geometry import Pose, yaw_rotation
+from robospa.geometry import Pose
 from robospa.harness.robots import embodiment
 from robospa.harness.running.atomic_file import replace_file
 from robospa.observation import CameraSpec
@@ -32,6 +33,7 @@ from robospa.tasks.sampling.places import LayoutError
 from robospa.tasks.scene import Scene
 from robospa.tasks.seeds import FIRST_TRAINING_SEED
 from robospa.tasks.sentences import sentences
+from robospa.trial import REFERENCE
 from robospa.workcell import HEIGHT, WIDTH, WORKCELL
 
 if TYPE_CHECKING:
@@ -74,6 +76,11 @@ def tokens_of(state: State) -> Array:
     return rows
 
 
+def last_of(state: State) -> tuple[int, int]:
+    """How many steps are done, and the number of the type of the last one."""
+    return len(state.done), TYPES.index(state.done[-1].type) if state.done else NOTHING
+
+
 @dataclass(frozen=True)
 class Lesson:
     """All states of a scene's plan: `tokens` (N, TOKEN_WIDTH) of each; `answers` (M, 6), the plan's
@@ -104,19 +111,19 @@ def lesson(scene: Scene) -> Lesson:
         left = [replace(s, destination=step.destination) for s in untouched if s.type == step.type]
         rows = [(s, steps.reminder(state, s) if named is None else named) for s in left or [step]]
         answers.append(np.array([_answer(*row) for row in rows], np.float32))
-    last = [(len(s.done), TYPES.index(s.done[-1].type) if s.done else NOTHING) for s, _ in pairs]
+    last = np.array([last_of(state) for state, _ in pairs], np.int16)
     every = sentences(scene, "train")
     told = tuple(every[int(i)] for i in rng.permutation(len(every))[:TOLD])
     clutter = lying_about(scene)
     tokens = [tokens_of(among(state, clutter)) for state, _ in pairs]
     where = variants().index((scene.task, scene.level))
-    return Lesson(tokens, answers, np.array(last, np.int16), told, where)
+    return Lesson(tokens, answers, last, told, where)
 
 
 def lying_about(scene: Scene) -> tuple[Tracked, ...]:
     """The clutter that the head camera shows; nothing is done with it."""
-    every = [steps.seen_at(o.asset, model_of(o), o.pose) for o in scene.clutter if o.asset in KINDS]
-    return tuple(Tracked(one, one) for one in every if steps.in_picture(one))
+    every = [steps.tracked(item) for item in scene.clutter if item.asset in KINDS]
+    return tuple(one for one in every if steps.in_picture(one.now))
 
 
 def among(state: State, clutter: tuple[Tracked, ...]) -> State:
@@ -136,15 +143,16 @@ def variants() -> tuple[tuple[str, int], ...]:
     return tuple((name, level) for name in tasks() for level in LEVELS)
 
 
-def scenes(block: int, first: int = FIRST_TRAINING_SEED, mode: str = "clean") -> Iterator[Scene]:
-    """One scene of every variant: block number `block`, whose seeds begin at `first`."""
+def scenes(block: int) -> Iterator[Scene]:
+    """One scene of every variant, of seeds of the block's own; those of a block are all clean, or
+    all randomised."""
+    mode = "randomized-seen" if block % 4 in RANDOMISED else "clean"
+    first = FIRST_TRAINING_SEED + block * 8
     for name, level in variants():
-        for seed in range(first + block * 8, first + block * 8 + 8):
-            try:
+        for seed in range(first, first + 8):
+            with suppress(LayoutError):
                 yield build_scene(name, level, seed, mode=mode)
-            except LayoutError:
-                continue
-            break
+                break
 
 
 @dataclass(frozen=True)
@@ -163,46 +171,40 @@ class Picture:
 
 
 @cache
-def _renderer(robot: str) -> tuple[Renderer, list[dict[str, Pose]]]:
+def _renderer() -> tuple[Renderer, list[dict[str, Pose]]]:
     """What draws, and the links of the arms at home; opened once a process."""
     from robospa.harness.sim.renderer import Renderer
     from robospa.harness.sim.sapien_world import SapienWorld
 
     world = SapienWorld(render=False)
-    world.load(build_scene("Click_Bell_Repeat", 1, FIRST_TRAINING_SEED, robot))
-    bodies, arms = world.bodies(), embodiment(robot).arms
-    pairs = zip(ARMS, arms, strict=True)
-    return Renderer(), [{n: bodies[f"{side} {n}"] for n in arm.links} for side, arm in pairs]
+    world.load(build_scene("Click_Bell_Repeat", 1, FIRST_TRAINING_SEED))
+    bodies, arms = world.bodies(), zip(ARMS, embodiment(REFERENCE).arms, strict=True)
+    return Renderer(), [{n: bodies[f"{side} {n}"] for n in arm.links} for side, arm in arms]
 
 
 def picture(scene: Scene, state: State) -> Picture:
     """What the head camera sees of a state of the scene's plan, arms at home."""
     from PIL import Image
 
-    renderer, links = _renderer(scene.embodiment)
-    items = steps.in_order(scene)
-    now = [o.now for o in state.objects]
-    poses = {o.name: _pose(model_of(o).bottom, s) for o, s in zip(items, now, strict=False)}
-    hinges = {o.name: s.hinge for o, s in zip(items, now, strict=False) if s.hinge}
+    renderer, links = _renderer()
+    poses, hinges = dict[str, Pose](), dict[str, float]()
+    for item, shown in zip(steps.in_order(scene), state.objects, strict=False):
+        poses[item.name] = steps.pose_of(shown.now, model_of(item))
+        hinges |= {item.name: shown.now.hinge} if shown.now.hinge else {}
     poses |= {o.name: o.pose for o in scene.clutter}
     renderer.sync(scene, embodiment(scene.embodiment))
     image = renderer.render([CameraSpec("head", WIDTH, HEIGHT)], links, poses, hinges)[0]
-    shown = [o.now for o in among(state, lying_about(scene)).objects if o.visible]
-    rows = [seen_numbers(s) for s in shown if steps.in_picture(s)]
+    every = [o.now for o in among(state, lying_about(scene)).objects if o.visible]
+    rows = [seen_numbers(one) for one in every if steps.in_picture(one)]
     packed = BytesIO()
     Image.fromarray(image).save(packed, "PNG", compress_level=1)
     return Picture(packed.getvalue(), np.array(rows, np.float32).reshape(-1, SEEN_WIDTH))
 
 
-def _pose(bottom: float, seen: Seen) -> Pose:
-    x, y, z = seen.place
-    return Pose((x, y, z - bottom), yaw_rotation(seen.turn))
-
-
-def middle_pixel(rows: Array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Column and row [px] of the middles of `Seen` rows (N, SEEN_WIDTH)."""
+def middle_pixel(rows: Array) -> NDArray[np.float64]:
+    """Column and row [px] of the middles of `Seen` rows (N, SEEN_WIDTH), as (N, 2)."""
     x, y, z = (rows[:, i].astype(np.float64) for i in (1, 2, 3))
-    return WORKCELL.head.pixel(x, y, z + rows[:, 6])
+    return np.stack(WORKCELL.head.pixel(x, y, z + rows[:, 6]), axis=1)
 
 
 def drawable(pairs: Sequence[tuple[State, Step]]) -> list[State]:
@@ -210,15 +212,10 @@ def drawable(pairs: Sequence[tuple[State, Step]]) -> list[State]:
     return [s for s, _ in pairs if not any(step.type in UNDRAWN for step in s.done)]
 
 
-def mode_of(block: int) -> str:
-    """The mode of the scenes of a block."""
-    return "randomized-seen" if block % 4 in RANDOMISED else "clean"
-
-
-def pictures(block: int, first: int = FIRST_TRAINING_SEED) -> Iterator[Picture]:
+def pictures(block: int) -> Iterator[Picture]:
     """One picture of every variant: of the start, or of a later state of the plan."""
-    rng = np.random.default_rng([first, block])
-    for scene in scenes(block, first, mode_of(block)):
+    rng = np.random.default_rng([FIRST_TRAINING_SEED, block])
+    for scene in scenes(block):
         states = drawable(steps.labelled(scene))
         later = len(states) > 1 and rng.random() < 0.5
         yield picture(scene, states[int(rng.integers(1, len(states))) if later else 0])

@@ -6,9 +6,10 @@ of objects that were seen, so that acting knows what to expect.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from robospa.geometry import Pose, Vec3, rotate, yaw_rotation
 from robospa.tasks import plan as calls
 from robospa.tasks.catalog import task
 from robospa.tasks.environment_state import main_color
-from robospa.tasks.objects import FAMILIES, model_of, object_model, variant_count
+from robospa.tasks.objects import assets, model_of, object_model, variant_count
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.shapes import Color, ObjectModel
 from robospa.workcell import HEIGHT, TABLE_TOP, WIDTH, WORKCELL
@@ -27,11 +28,14 @@ TYPES = (
 )
 """move: onto `destination` or to `place`; back: to where it stood at first; turn: as `destination`
 lay at first. Press, stamp, hit and lift are once a step."""
-KINDS = tuple(sorted(name for family in FAMILIES for name in family.ASSETS))
+WITH_GOAL = ("move", "turn", "drop", "stamp", "dock", "hang", "hit", "pour")
+"""Types of steps that have a destination; to move is also to move to a place."""
+KINDS = assets()
 """The library's assets."""
-HELD, OPENED, SAME_PLACE = 0.12, 0.7, 0.012
-"""How high [m] a picked object is held; how far a door is opened, as a share; a thing that comes as
-near [m] as that to where it stood at first is brought back."""
+WEIGHTS = Path(__file__).parent / "weights"
+"""What is served where no other folder is named."""
+SAME_PLACE = 0.012
+"""A thing that comes as near [m] as that to where it stood at first is brought back."""
 MIDDLE = (0.0, 0.0, 1.0)
 """Of a box, in halves of it from the middle of its underside."""
 SUNK = 0.06
@@ -95,27 +99,26 @@ def params_of(seen: Seen) -> Mapping[str, object]:
     """Parameters of that model: a block has the sizes seen, of all else there are a few looks."""
     if seen.kind == "block":
         return {"half": list(seen.half), "color": list(seen.color)}
-    return min(_looks(seen.kind), key=lambda look: _unlike(seen, look[1], look[2]))[0]
+    size = [2 * h for h in seen.half]
+
+    def unlike(look: tuple[Mapping[str, object], Vec3, Color]) -> float:
+        return math.dist(size, look[1]) + 0.003 * math.dist(seen.color, look[2])
+
+    return min(_looks(seen.kind), key=unlike)[0]
 
 
 @cache
-def _looks(kind: str) -> tuple[tuple[Mapping[str, object], Vec3, Color], ...]:
-    kinds: tuple[Mapping[str, int], ...] = (
-        ({"kind": 0}, {"kind": 1}) if kind == "t_block" else ({},)
-    )
-    every = [{"look": look, **more} for look in range(variant_count(kind)) for more in kinds]
-    made = [(params, object_model(kind, params)) for params in every]
-    return tuple((p, m.size, main_color(m)) for p, m in made)
+def _looks(kind: str) -> list[tuple[Mapping[str, object], Vec3, Color]]:
+    forms: list[dict[str, object]] = [{"kind": 0}, {"kind": 1}] if kind == "t_block" else [{}]
+    every = [{"look": look, **form} for look in range(variant_count(kind)) for form in forms]
+    models = [object_model(kind, params) for params in every]
+    return [(p, m.size, main_color(m)) for p, m in zip(every, models, strict=True)]
 
 
-def _unlike(seen: Seen, size: Vec3, color: Color) -> float:
-    return math.dist([2 * h for h in seen.half], size) + 0.003 * math.dist(seen.color, color)
-
-
-def pose_of(seen: Seen) -> Pose:
-    """Pose [m, world] of the body frame of its model."""
+def pose_of(seen: Seen, made: ObjectModel | None = None) -> Pose:
+    """Pose [m, world] of the body frame of its model, or of that which it is known to have."""
     x, y, z = seen.place
-    return Pose((x, y, z - model(seen).bottom), yaw_rotation(seen.turn))
+    return Pose((x, y, z - (made or model(seen)).bottom), yaw_rotation(seen.turn))
 
 
 def seen_at(kind: str, made: ObjectModel, pose: Pose, hinge: float = 0.0) -> Seen:
@@ -131,8 +134,9 @@ def labelled(scene: Scene, rng: np.random.Generator | None = None) -> list[tuple
     """All states of the scene's plan, each with its next step; the last one is done. With `rng`,
     the things are moved in an order of its own."""
     items = in_order(scene)
-    state = State(tuple(_tracked(o) for o in items if o.appears_at is None))
-    later = tuple(_tracked(o) for o in items[len(state.objects) :])
+    every = tuple(map(tracked, items))
+    state = State(tuple(one for one in every if one.at_start))
+    later = every[len(state.objects) :]
     plan, found = numbered(scene), list[tuple[State, Step]]()
     moves = [step for step in plan if step.type != "wait"]
     if rng is not None and len({step.destination for step in moves}) == 1:
@@ -145,14 +149,15 @@ def labelled(scene: Scene, rng: np.random.Generator | None = None) -> list[tuple
     return [*found, (state, Step("done"))]
 
 
+def tracked(item: SceneObject) -> Tracked:
+    """An object of a scene, where it is when it appears."""
+    seen = seen_at(item.asset, model_of(item), item.pose)
+    return Tracked(seen, seen, at_start=item.appears_at is None)
+
+
 def in_order(scene: Scene) -> list[SceneObject]:
     """The scene's objects as its states number them: those that appear later come last."""
     return sorted(scene.objects, key=lambda item: item.appears_at is not None)
-
-
-def numbered(scene: Scene) -> list[Step]:
-    """The steps of the scene's plan, objects numbered as in its states."""
-    return list(steps_of(scene, {item.name: i for i, item in enumerate(in_order(scene))}))
 
 
 def reminder(state: State, step: Step) -> int | None:
@@ -169,63 +174,42 @@ def reminder(state: State, step: Step) -> int | None:
     return None
 
 
-def _tracked(item: SceneObject) -> Tracked:
-    seen = seen_at(item.asset, model_of(item), item.pose)
-    return Tracked(seen, seen, at_start=item.appears_at is None)
-
-
-def steps_of(scene: Scene, names: Mapping[str, int]) -> Iterator[Step]:
-    """The steps of the scene's plan; `names` says which number an object has."""
-    plan: list[object] = [c for c in task(scene.task).plan(scene) if not isinstance(c, calls.Home)]
+def numbered(scene: Scene) -> list[Step]:
+    """The steps of the scene's plan, objects numbered as in its states."""
+    names: dict[str | None, int] = {item.name: i for i, item in enumerate(in_order(scene))}
     starts = {o.name: o.pose.position for o in scene.objects}
     partners = dict(zip(scene.facts.get("near", ()), scene.facts.get("far", ()), strict=True))
+    plan = [c for c in task(scene.task).plan(scene) if not isinstance(c, calls.Home)]
+    made = list[Step]()
     while plan:
         call = plan.pop(0)
-        match call:
-            case calls.Pick(object=name):
-                goal = (
-                    plan.pop(0) if plan and isinstance(plan[0], calls.Place | calls.Drop) else None
-                )
-                if _goes_on(plan, name, goal):
-                    continue
-                yield _moved(names, name, goal, starts[name], partners)
-            case calls.Press(object=name) | calls.Open(object=name):
-                yield Step(type(call).__name__.lower(), names[name])
-            case calls.Stamp():
-                yield from [Step("stamp", names[call.object], names[call.on])] * call.times
-            case calls.Dock() | calls.Hang():
-                yield Step(type(call).__name__.lower(), names[call.object], names[call.on])
-            case calls.Hit():
-                yield from (Step("hit", names[call.tool], names[t]) for t in call.targets)
-            case calls.Pour():
-                yield Step("pour", names[call.object], names[call.into])
-            case calls.RaiseLower():
-                yield from [Step("lift", names[call.object])] * call.times
-            case calls.Wait():
-                yield Step("wait")
+        if isinstance(call, calls.Pick) and plan and isinstance(plan[0], calls.Place | calls.Drop):
+            call = plan.pop(0)
+            follow = plan[0] if plan else None
+            again = isinstance(follow, calls.Pick) and follow.object == call.object
+            if again and isinstance(call, calls.Place) and call.on is None:
+                continue  # put down only to be taken anew: handed over, or turned by halves
+        (own, goals), name, place = named(call), type(call).__name__.lower(), None
+        name = {"place": "move", "raiselower": "lift"}.get(name, name)
+        if isinstance(call, calls.Place) and call.on is None:
+            if call.yaw is not None:
+                name, goals = "turn", [partners[call.object]]
+            elif math.dist(call.position, starts[call.object]) < SAME_PLACE:
+                name = "back"
+            else:
+                place = call.position[:2]
+        every = [Step(name, names.get(own), names.get(goal), place) for goal in goals]
+        made += every * vars(call).get("times", 1)
+    return made
 
 
-def _goes_on(plan: Sequence[object], name: str, goal: object) -> bool:
-    """Whether the object is put down only to be taken anew: handed over, or turned by halves."""
-    if not plan or not isinstance(plan[0], calls.Pick) or plan[0].object != name:
-        return False
-    return isinstance(goal, calls.Place) and goal.on is None
-
-
-def _moved(
-    names: Mapping[str, int], name: str, goal: object, start: Vec3, partners: Mapping[str, str]
-) -> Step:
-    if isinstance(goal, calls.Drop):
-        return Step("drop", names[name], names[goal.into])
-    if not isinstance(goal, calls.Place):
-        return Step("pick", names[name])
-    if goal.on is not None:
-        return Step("move", names[name], names[goal.on])
-    if goal.yaw is not None:
-        return Step("turn", names[name], names[partners[name]])
-    if math.dist(goal.position, start) < SAME_PLACE:
-        return Step("back", names[name])
-    return Step("move", names[name], None, goal.position[:2])
+def named(call: object) -> tuple[str | None, Sequence[str | None]]:
+    """The object that a plan's call is about, and what this is brought to, one after the other."""
+    given = vars(call)
+    return (
+        given.get("object", given.get("tool")),
+        given.get("targets", [given.get("on") or given.get("into")]),
+    )
 
 
 def after(state: State, step: Step) -> State:
@@ -242,12 +226,12 @@ def after(state: State, step: Step) -> State:
 
 
 def _brought(items: Sequence[Tracked], step: Step, item: Tracked, goal: Tracked | None) -> Seen:
+    """The object of a step, as it is after it."""
     now, (x, y, z) = item.now, item.now.place
+    if step.type == "open" and (hinge := model(now).hinge):
+        return replace(now, hinge=calls.Open.to * hinge.upper)
     if step.type == "pick":
-        return replace(now, place=(x, y, z + HELD))
-    if step.type == "open":
-        hinge = model(now).hinge
-        return replace(now, hinge=OPENED * hinge.upper) if hinge else now
+        return replace(now, place=(x, y, z + calls.Pick.lift))
     if step.type == "back":
         return replace(now, place=item.first.place)
     if step.type == "move" and step.place is not None:
@@ -256,20 +240,16 @@ def _brought(items: Sequence[Tracked], step: Step, item: Tracked, goal: Tracked 
         return now
     if step.type == "turn":
         return replace(now, turn=goal.first.turn)
-    return _at(step.type, now, goal.now)
-
-
-def _at(kind: str, now: Seen, goal: Seen) -> Seen:
-    """`now`, brought to the object `goal` by a step of some kind."""
-    if kind in ("dock", "hang"):
-        frame = pose_of(goal) * model(goal).frames["support" if kind == "dock" else "hang"]
-        if kind == "hang":
+    frames = model(goal.now).frames
+    frame = pose_of(goal.now) * frames["hang" if step.type == "hang" else "support"]
+    if step.type in ("dock", "hang"):
+        if step.type == "hang":
             frame = frame * model(now).frames["handle"].inverse()
         return replace(seen_at(now.kind, model(now), frame), color=now.color, half=now.half)
-    x, y, top = (pose_of(goal) * model(goal).frames["support"]).position
-    if kind in ("hit", "pour"):
-        return replace(now, place=(x, y, top + HELD))
-    return replace(now, place=(x, y, goal.place[2] if kind == "drop" else top))
+    x, y, top = frame.position
+    if step.type in ("hit", "pour"):
+        top += calls.Pick.lift
+    return replace(now, place=(x, y, goal.now.place[2] if step.type == "drop" else top))
 
 
 def table_top(heights: Iterable[float]) -> float:
@@ -319,8 +299,7 @@ def in_picture(seen: Seen) -> bool:
 def pixel(one: Seen, shares: Sequence[float] = MIDDLE) -> tuple[float, float]:
     """Where the head camera sees its middle [px], or another place in `shares` of its half sizes
     from the middle of its underside."""
-    spot = np.array(one.place) + np.multiply(one.half, shares)
-    u, v = WORKCELL.head.pixel(*(np.array(n) for n in spot))
+    u, v = WORKCELL.head.pixel(*(np.array(one.place) + np.multiply(one.half, shares)))
     return float(u), float(v)
 
 

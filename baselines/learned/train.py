@@ -7,7 +7,6 @@ steps that one in a piece would.
 
 from __future__ import annotations
 
-import hashlib
 import io
 import json
 import time
@@ -29,6 +28,8 @@ from robospa.baselines.learned import perceive, point, scenes
 from robospa.baselines.learned.perceive import FindNetwork, MeasureNetwork
 from robospa.baselines.learned.point import Batch, PointNetwork, Vocabulary
 from robospa.baselines.learned.scenes import NOTHING, SEEN_WIDTH, Lesson, lesson
+from robospa.baselines.learned.steps import WEIGHTS
+from robospa.harness.datasets.manifest import file_hash
 from robospa.harness.pool import JobProcess, Pool
 from robospa.harness.running.atomic_file import replace_file
 from robospa.protocol.options import option
@@ -40,7 +41,7 @@ BATCH, PICTURES, EVERY = 64, 16, 200
 """States and pictures of a step; a line, and what can be gone on from, after so many steps."""
 RATES = {"point": (1e-3, 0.6), "find": (2e-3, 0.0), "measure": (2e-3, 0.0)}
 """Learning rates, reached in WARM steps, and the share of the steps after which they fall."""
-PARAPHRASES = Path(__file__).parent / "weights" / "paraphrases.txt"
+PARAPHRASES = WEIGHTS / "paraphrases.txt"
 SAID_ANEW, LONGEST_PHRASE = (0.0, 0.5, 0.9), 9
 """Shares of a sentence's phrases that are said in another way; words of the longest phrase."""
 WARM, QUICK = 100, 0.7
@@ -63,46 +64,51 @@ say = partial(print, flush=True)
 """Tell how it gets on, at once."""
 
 
-class Training:
-    """Steps of one network, kept in `folder` so that they can be gone on with."""
+Losses = Mapping[str, Tensor]
+"""Parts of a loss, which are summed."""
 
-    def __init__(self, folder: Path, name: str, network: nn.Module, steps: int) -> None:
-        self._path, self._name, self._network = folder / f"{name}.pt", name, network
-        self._steps, (self._rate, self._level) = steps, RATES[name]
-        self.done, self.shown = 0, dict[str, float]()
-        self._optimizer = torch.optim.AdamW(network.parameters(), self._rate, weight_decay=0.01)
-        if self._path.exists():
-            kept = torch.load(self._path, weights_only=True)
-            network.load_state_dict(kept["network"])
-            self._optimizer.load_state_dict(kept["optimizer"])
-            self.done = kept["done"]
 
-    def run(self, losses: Callable[[int], Mapping[str, Tensor]]) -> None:
-        """All steps that are left; `losses` of a step are summed."""
-        self._network.train()
-        begun, start = self.done, time.monotonic()
-        while self.done < self._steps:
-            falls = (1 - self.done / self._steps) / (1 - self._level)
-            share = min(1.0, (self.done + 1) / WARM) * (0.02 + 0.98 * min(1.0, falls))
-            self._optimizer.param_groups[0]["lr"] = self._rate * share
-            parts = losses(self.done)
-            self._optimizer.zero_grad(set_to_none=True)
-            sum(parts.values(), torch.zeros(())).backward()
-            nn.utils.clip_grad_norm_(self._network.parameters(), 2.0)
-            self._optimizer.step()
-            self.done += 1
-            for name, value in ((name, float(part.detach())) for name, part in parts.items()):
-                self.shown[name] = 0.98 * self.shown.get(name, value) + 0.02 * value
-            if self.done % EVERY == 0 or self.done == self._steps:
-                states = {"network": self._network.state_dict(), "done": self.done}
-                stream = io.BytesIO()
-                torch.save({**states, "optimizer": self._optimizer.state_dict()}, stream)
-                replace_file(self._path, stream.getvalue())
-                left = (time.monotonic() - start) / (self.done - begun) * (self._steps - self.done)
-                told = ", ".join(f"{name} {value:.3f}" for name, value in self.shown.items())
-                where = f"{self._name} {self.done:,}/{self._steps:,}"
-                say(f"{where}: {told}; {left / 60:.0f} min left")
-        self._network.eval()
+def fit(
+    out: Path,
+    name: str,
+    network: nn.Module,
+    options: TrainOptions,
+    losses: Callable[[np.random.Generator, bool], Losses],
+) -> None:
+    """All steps of a network that are left, kept in `out` so that they can be gone on with, and its
+    weights. `losses` get random numbers of the step, and whether it may be less exact."""
+    path, total = out / f"{name}.pt", int(getattr(options, name))
+    rate, level = RATES[name]
+    done, shown = 0, dict[str, float]()
+    optimizer = torch.optim.AdamW(network.parameters(), rate, weight_decay=0.01)
+    if path.exists():
+        kept = torch.load(path, weights_only=True)
+        network.load_state_dict(kept["network"])
+        optimizer.load_state_dict(kept["optimizer"])
+        done = kept["done"]
+    network.train()
+    begun, start = done, time.monotonic()
+    while done < total:
+        falls = (1 - done / total) / (1 - level)
+        share = min(1.0, (done + 1) / WARM) * (0.02 + 0.98 * min(1.0, falls))
+        optimizer.param_groups[0]["lr"] = rate * share
+        parts = losses(np.random.default_rng([options.seed, done]), done < QUICK * total)
+        optimizer.zero_grad(set_to_none=True)
+        sum(parts.values(), torch.zeros(())).backward()
+        nn.utils.clip_grad_norm_(network.parameters(), 2.0)
+        optimizer.step()
+        done += 1
+        for part, value in parts.items():
+            shown[part] = 0.98 * shown.get(part, value.item()) + 0.02 * value.item()
+        if done % EVERY == 0 or done == total:
+            states = {"network": network.state_dict(), "optimizer": optimizer.state_dict()}
+            stream = io.BytesIO()
+            torch.save({**states, "done": done}, stream)
+            replace_file(path, stream.getvalue())
+            left = (time.monotonic() - start) / (done - begun) * (total - done)
+            told = ", ".join(f"{part} {value:.3f}" for part, value in shown.items())
+            say(f"{name} {done:,}/{total:,}: {told}; {left / 60:.0f} min left")
+    perceive.save_weights(network, out / f"{name}.npz")
 
 
 HARD = (
@@ -212,9 +218,7 @@ def misseen(rng: np.random.Generator, tokens: NDArray[np.float32]) -> NDArray[np
     return made
 
 
-def point_losses(
-    network: PointNetwork, batch: Batch, answers: Tensor, right: Tensor
-) -> dict[str, Tensor]:
+def point_losses(network: PointNetwork, batch: Batch, answers: Tensor, right: Tensor) -> Losses:
     """Of the type, the object, the destination, the place, and the reference where there is one."""
     kind, chosen, goal, refers = (answers[:, i].long() for i in (0, 1, 2, 5))
     told = network(batch)
@@ -262,21 +266,18 @@ def _worker(argument: tuple[Path, TrainOptions]) -> Callable[[str], None]:
 
 
 def _point(out: Path, options: TrainOptions) -> None:
-    blocks = (scenes.scenes(n, mode=scenes.mode_of(n)) for n in range(options.blocks))
+    blocks = (scenes.scenes(n) for n in range(options.blocks))
     lessons = [lesson(scene) for block in blocks for scene in block]
     told = (sentence for item in lessons for sentence in item.told)
-    words = point.vocabulary_of(chain(told, *paraphrases().values()), 2)
-    vocabulary = Vocabulary(words)
+    vocabulary = Vocabulary(point.vocabulary_of(chain(told, *paraphrases().values()), 2))
     states = States(lessons, vocabulary)
     torch.manual_seed(options.seed)
     network = PointNetwork(point.FIRST_WORD + len(vocabulary.words))
 
-    def losses(step: int) -> dict[str, Tensor]:
-        rng = np.random.default_rng([options.seed, step])
+    def losses(rng: np.random.Generator, quick: bool) -> Losses:
         return point_losses(network, *states.draw(rng, BATCH))
 
-    Training(out, "point", network, options.point).run(losses)
-    perceive.save_weights(network, out / "point.npz")
+    fit(out, "point", network, options, losses)
     replace_file(out / "words.json", json.dumps(vocabulary.words).encode())
 
 
@@ -285,24 +286,20 @@ def _perceive(out: Path, name: str, options: TrainOptions) -> None:
     torch.manual_seed(options.seed)
     network = FindNetwork() if name == "find" else MeasureNetwork()
     network.to(memory_format=torch.channels_last)
-    total = options.find if name == "find" else options.measure
 
-    def losses(step: int) -> dict[str, Tensor]:
-        rng = np.random.default_rng([options.seed, step])
+    def losses(rng: np.random.Generator, quick: bool) -> Losses:
         chosen = [shown[i] for i in rng.integers(len(shown), size=PICTURES)]
         images, seen = [o.image for o in chosen], [o.seen for o in chosen]
-        quick = step < QUICK * total
         if isinstance(network, FindNetwork):
             return perceive.find_losses(network, images, seen, quick)
         return perceive.measure_losses(network, rng, images, seen, quick)
 
-    Training(out, name, network, total).run(losses)
-    perceive.save_weights(network, out / f"{name}.npz")
+    fit(out, name, network, options, losses)
 
 
 def train(out: Path, options: TrainOptions | None = None) -> None:
     """The whole recipe, on two cores, into the folder `out`; what is there already is not made
-    again. The weights that `perceive.load` and `point.load` read, and their card, are left there.
+    again. The weights that `perceive` and `point` read, and their card, are left there.
     """
     options = options or TrainOptions()
     begun = time.monotonic()
@@ -311,17 +308,8 @@ def train(out: Path, options: TrainOptions | None = None) -> None:
         for parts in PARTS:
             for done in [pool.submit(part) for part in parts]:
                 done.result()
-    card = card_of(out, options)
-    replace_file(out / "card.json", (json.dumps(card, indent=1) + "\n").encode())
-    say(f"done in {(time.monotonic() - begun) / 60:.0f} min: {out}")
-
-
-def card_of(out: Path, options: TrainOptions) -> dict[str, object]:
-    """What the weights in a folder say of themselves."""
-    files = ["find.npz", "measure.npz", "point.npz", "words.json"]
-    paths = [*(out / name for name in files), point.PIECES]
-    hashes = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in paths}
-    return {
+    files = [out / name for name in ("find.npz", "measure.npz", "point.npz", "words.json")]
+    card = {
         "name": "learned",
         "suite": SUITE,
         "learned_from": "drawn scenes and their plans: training seeds, seen textures, sentences of "
@@ -329,5 +317,7 @@ def card_of(out: Path, options: TrainOptions) -> dict[str, object]:
         "labels": "poses, sizes and kinds of the scenes' objects; steps of the expert's plans",
         "options": asdict(options),
         "pieces": "pieces.npz is cut from the weights of wordllama (MIT, see LICENSE-wordllama)",
-        "sha256": hashes,
+        "sha256": {path.name: file_hash(path) for path in (*files, point.PIECES)},
     }
+    replace_file(out / "card.json", (json.dumps(card, indent=1) + "\n").encode())
+    say(f"done in {(time.monotonic() - begun) / 60:.0f} min: {out}")

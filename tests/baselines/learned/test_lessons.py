@@ -72,7 +72,7 @@ def test_a_picture_shows_each_object_where_it_is_said_to_be() -> None:
     shown = scenes.picture(STACK, steps.labelled(STACK)[0][0])
     assert shown.image.shape == (240, 320, 3) and len(shown.seen) == len(STACK.objects)
     empty = shown.image[5, 160].astype(int)
-    for u, v in zip(*scenes.middle_pixel(shown.seen), strict=True):
+    for u, v in scenes.middle_pixel(shown.seen):
         assert np.abs(shown.image[int(v), int(u)].astype(int) - empty).max() > 20
 
 

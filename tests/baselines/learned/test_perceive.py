@@ -30,7 +30,7 @@ def test_a_pixel_leads_back_to_its_place_on_the_table() -> None:
 
 
 def test_what_is_labelled_is_told_again() -> None:
-    pixels = np.stack(scenes.middle_pixel(rows(MUG, CUBE)), axis=1).round()
+    pixels = scenes.middle_pixel(rows(MUG, CUBE)).round()
     labels = perceive.labels_of(rows(MUG, CUBE), pixels).double().numpy()
     kinds = np.eye(len(KINDS))[[KINDS.index("mug"), KINDS.index("block")]]
     mug, cube = perceive.seen_of(np.concatenate([labels, kinds], axis=1), pixels)
@@ -41,7 +41,7 @@ def test_what_is_labelled_is_told_again() -> None:
 
 def test_a_thing_seen_much_too_large_is_what_it_lies_in() -> None:
     ball = Seen("garbage", (0.0, 0.0, 0.74), (0.04, 0.04, 0.06), 0.0, (1.0, 0.0, 0.0))
-    pixels = np.stack(scenes.middle_pixel(rows(ball)), axis=1)
+    pixels = scenes.middle_pixel(rows(ball))
     kinds = np.zeros((1, len(KINDS)))
     kinds[0, [KINDS.index("garbage"), KINDS.index("table_trash_bin")]] = 4.0, 3.0
     labels = perceive.labels_of(rows(ball), pixels).double().numpy()
@@ -68,7 +68,8 @@ def test_what_is_seen_on_a_lower_table_is_where_it_was_seen() -> None:
 def test_what_lies_around_the_picture_is_its_edge() -> None:
     image = np.zeros((240, 320, 3), np.uint8)
     image[:, :160] = 200
-    made = perceive.around(image, np.array([[0, 0], [319, 239]]))
+    made, pixels = perceive.around(image, np.array([[-2.0, 0.4], [319.0, 240.0]]))
+    np.testing.assert_array_equal(pixels, [[0, 0], [319, 239]])
     assert made.shape == (2, perceive.AROUND, perceive.AROUND, 6)
     assert (made[0] == 200).all() and (made[1] == 0).all()
 

@@ -27,7 +27,7 @@ def pointer(tmp_path: Path) -> point.Pointer:
     torch.manual_seed(0)
     (tmp_path / "words.json").write_text(json.dumps(WORDS))
     save_weights(point.PointNetwork(point.FIRST_WORD + len(WORDS)), tmp_path / "point.npz")
-    return point.load(tmp_path)
+    return point.Pointer(tmp_path)
 
 
 def test_unknown_words_are_near_those_that_mean_the_same() -> None:

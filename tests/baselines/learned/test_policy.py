@@ -137,12 +137,13 @@ def test_another_robot_does_the_same_steps(robot: str) -> None:
 
 
 RED = Seen("block", (0.1, 0.0, 0.74), (0.02, 0.02, 0.02), 0.0, (1.0, 0.0, 0.0))
+STATE = np.zeros(14, np.float32)
 BLUE = replace(RED, place=(0.15, 0.0, 0.74), color=(0.0, 0.0, 1.0))
 
 
 def test_what_is_seen_again_is_what_it_was() -> None:
     bell = Seen("bell", (0.0, 0.1, 0.74), (0.04, 0.04, 0.03), 0.0, (0.6, 0.6, 0.6))
-    belief = Belief(embodiment(REFERENCE), [RED, BLUE])
+    belief = Belief(embodiment(REFERENCE), [RED, BLUE], STATE)
     moved = replace(RED, place=(-0.2, 0.0, 0.74))
     belief.look([bell, replace(BLUE, place=(0.1, 0.01, 0.74)), moved])
     items = belief.state.objects
@@ -153,13 +154,13 @@ def test_what_is_seen_again_is_what_it_was() -> None:
 
 def test_a_pile_that_is_seen_as_one_thing_is_as_it_was() -> None:
     pile = (RED, replace(BLUE, place=(0.1, 0.0, 0.78)))
-    belief = Belief(embodiment(REFERENCE), pile)
+    belief = Belief(embodiment(REFERENCE), pile, STATE)
     belief.look([replace(BLUE, place=(0.1, 0.0, 0.75), half=(0.02, 0.02, 0.03))])
     assert [(o.now, o.visible) for o in belief.state.objects] == [(one, True) for one in pile]
 
 
 def test_a_stand_and_a_wall_are_known_by_what_they_carry_and_hide() -> None:
-    belief = Belief(embodiment(REFERENCE), [RED, replace(BLUE, place=(0.1, 0.2, 0.83))])
+    belief = Belief(embodiment(REFERENCE), [RED, replace(BLUE, place=(0.1, 0.2, 0.83))], STATE)
     belief.look([RED], waiting=True)
     stand, _, _, wall = (o.now for o in belief.state.objects)
     assert stand.place[2] + 2 * stand.half[2] == pytest.approx(0.83) and is_wall(wall)
