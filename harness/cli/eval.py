@@ -216,14 +216,14 @@ def _curve(
 
     if settings.out is None:
         raise SettingsError("a curve is several runs: name a folder for them with --out")
+    times = [f"{latency:g}ms" for latency in latencies]
+    timings = [replace(settings.timing, clock=f"real:{text}") for text in times]
     results = []
-    for latency in latencies:
-        folder = settings.out / f"{latency:g}ms"
-        asked = replace(
-            settings, out=folder, timing=replace(settings.timing, clock=f"real:{latency:g}ms")
-        )
+    for text, timing in zip(times, timings, strict=True):
+        folder = settings.out / text
+        asked = replace(settings, out=folder, timing=timing)
         going = resume and (folder / "run.json").exists()
-        _run_one(make_request(asked, token=token, resume=going), f"{latency:g} ms")
+        _run_one(make_request(asked, token=token, resume=going), text.replace("ms", " ms"))
         results.append(results_of_run(read_run(folder)))
     curve = latency_curve(results)
     import json

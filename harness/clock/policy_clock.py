@@ -88,13 +88,17 @@ class Latency:
         """As `parse_latency` reads it."""
         if self.constant is not None:
             return _time(self.constant)
-        return ",".join(f"p{p:g}={_time(v)}" for p, v in self.points)
+        return ",".join(f"{_percentile(p)}={_time(v)}" for p, v in self.points)
 
 
 def _time(milliseconds: float) -> str:
     """Every digit of it: what is read again is equal."""
     digits = f"{milliseconds:.6f}".rstrip("0").rstrip(".")
     return f"{digits}ms" if digits != "0" else "0"
+
+
+def _percentile(number: float) -> str:
+    return f"p{number:.9g}"  # 100 with six decimals, which is what is read
 
 
 def parse_latency(text: str) -> Latency:
@@ -108,7 +112,7 @@ def parse_latency(text: str) -> Latency:
             found = POINT.fullmatch(part.strip())
             if found is None:
                 raise ClockError(f"{part.strip()!r} is no percentile, such as p50=120ms")
-            points.append((float(found[1]), _milliseconds(found[2])))
+            points.append((round(float(found[1]), 6), _milliseconds(found[2])))
         return Latency(tuple(points))
     return read_latency(Path(text))
 
@@ -141,13 +145,15 @@ def read_latency(path: Path) -> Latency:
     found = data.get("latency_ms") if isinstance(data, Mapping) else None
     try:
         if isinstance(found, Mapping):
-            points = [(float(str(name).removeprefix("p")), float(v)) for name, v in found.items()]
-            return Latency(tuple(sorted(points)))
+            points = [(str(name).removeprefix("p"), v) for name, v in found.items()]
+            return Latency(
+                tuple(sorted((round(float(p), 6), round(float(v), 6)) for p, v in points))
+            )
         if isinstance(found, Sequence) and not isinstance(found, str):
             return of_samples([float(v) for v in found])
     except ClockError as error:
         raise ClockError(f"{path}: {error}") from error
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise ClockError(f"{path}: 'latency_ms' has something that is no number") from error
     raise ClockError(
         f"{path} has no 'latency_ms', a map of percentiles or a list of measured latencies"
@@ -169,7 +175,7 @@ def of_samples(samples: Sequence[float]) -> Latency:
 
 def latency_json(latency: Latency) -> dict[str, Any]:
     """As a file has it."""
-    return {"latency_ms": {f"p{p:g}": v for p, v in latency.points}}
+    return {"latency_ms": {_percentile(p): v for p, v in latency.points}}
 
 
 RULE = re.compile(r"(wait|arrival|after|ensemble|rtc)(?::([1-9][0-9]{0,4}))?")

@@ -51,6 +51,10 @@ REFUSED += [
     for given in ("0", "200,100", "0,x", "-5,10", "0,0")
 ]
 REFUSED += [
+    (f"eval hold --tasks Pick_Blocks_Size --action-rate 25 --out run --latency {given}", said)
+    for given, said in (("0,70000", "from 0 to 60000 ms"), ("0,nan", "is no latency"))
+]
+REFUSED += [
     (" ".join(eval_words("run", *words.split())), said)
     for words, said in [
         ("ws://127.0.0.1:9", "127.0.0.1:9"),

@@ -118,9 +118,15 @@ def test_a_clock_is_frozen_with_what_its_file_holds(tmp_path: Path) -> None:
     assert timing.clock == "real:p0=80ms,p50=120ms,p100=400ms"
     assert frozen_timing(timing) == timing
     assert frozen_timing(Timing()) == Timing()
+    for held in ([1.0, 2, 3, 4], {"p33.3333333": 1.23456789, "p50": 2}):
+        file.write_text(json.dumps({"latency_ms": held}))
+        exact = Timing(clock=f"real:{file}")
+        frozen = declared_latency(frozen_timing(exact).clock)
+        assert frozen == declared_latency(exact.clock)
 
 
-@pytest.mark.parametrize("text", ["{", "[]", '{"latency_ms": "soon"}', '{"latency_ms": [null]}'])
+@pytest.mark.parametrize("text", ["{", "[]", '{"latency_ms": "soon"}', '{"latency_ms": [null]}',
+    f'{{"latency_ms": [1{"0" * 400}]}}'])  # fmt: skip
 def test_a_file_that_is_no_latency_is_named(tmp_path: Path, text: str) -> None:
     file = tmp_path / "broken.json"
     file.write_text(text)
