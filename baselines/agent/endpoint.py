@@ -18,13 +18,14 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import ModuleType
+from typing import Annotated
 
 import msgspec
+from msgspec import Meta
 
 from robospa.extras import need
 from robospa.protocol.errors import CallTimeout, printable, without_secrets
 from robospa.protocol.options import option
-from robospa.schema import Count
 
 REFUSED = (400, 413, 422)
 """Statuses with which an endpoint refuses what it was sent."""
@@ -59,6 +60,10 @@ Usage = dict[str, float]
 """What has been used, by the names of `protocol.policy.USAGE`."""
 
 
+Some = Annotated[int, Meta(ge=1)]
+Amount = Annotated[float, Meta(ge=0)]
+
+
 @dataclass(frozen=True)
 class EndpointOptions:
     """Where the model is, and how it is asked."""
@@ -67,7 +72,7 @@ class EndpointOptions:
     model: str = option("", "name of the model there")
     key: str = option("OPENAI_API_KEY", "environment variable that holds the key, if one is needed")
     form: str = option("json", "how the model answers: JSON text, or tool calls", ("json", "tools"))
-    max_tokens: Count = option(2000, "tokens of an answer, at most")
+    max_tokens: Some = option(2000, "tokens of an answer, at most")
     limit: str = option(
         "max_tokens",
         "field of the request that says so",
@@ -76,12 +81,12 @@ class EndpointOptions:
     extra: str | None = option(
         None, 'more fields of the request, as JSON, such as {"temperature": 0}'
     )
-    deadline: float = option(
+    deadline: Annotated[float, Meta(gt=0)] = option(
         100.0, "seconds for a query, repairs and waits included; less than the client allows (120)"
     )
-    parallel: Count = option(8, "requests at once, at most")
-    price_in: float = option(0.0, "price of a million input tokens")
-    price_out: float = option(0.0, "price of a million output tokens")
+    parallel: Some = option(8, "requests at once, at most")
+    price_in: Amount = option(0.0, "price of a million input tokens")
+    price_out: Amount = option(0.0, "price of a million output tokens")
 
     def price(self, tokens_in: float, tokens_out: float) -> float:
         """Of so many tokens."""

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from robospa.baselines.agent.endpoint import (
+    Amount,
     BadAnswer,
     ChatEndpoint,
     EndpointError,
@@ -109,8 +110,8 @@ class AgentOptions(EndpointOptions):
     memory: Count = option(3, "earlier pictures that it gets again: the first and the last ones")
     repairs: Count = option(2, "how often in a row it may mend an answer that is no list of calls")
     most_requests: Count = option(60, "answers of the model in a trial, at most")
-    most_seconds: float = option(1800.0, "seconds of its answers in a trial, at most")
-    most_cost: float = option(0.0, "cost of a trial at most, at the prices given; 0 for no limit")
+    most_seconds: Amount = option(1800.0, "seconds of its answers in a trial, at most")
+    most_cost: Amount = option(0.0, "cost of a trial at most, at the prices given; 0 for no limit")
     log: Path | None = option(None, "folder for a file per trial with all questions and answers")
 
 
@@ -320,7 +321,7 @@ def read_answer(texts: Sequence[str], spec: PolicySpec) -> tuple[str, list[dict[
 
 def _last_json(text: str) -> dict[str, object]:
     """The last JSON object with calls in a text, around which a model may have written more."""
-    read, at = json.JSONDecoder(), 0
+    read, at = json.JSONDecoder(strict=False), 0
     found: dict[str, object] | None = None
     while (at := text.find("{", at)) >= 0:
         try:

@@ -15,9 +15,10 @@ from scripted_endpoint import AWAY, BAD, ScriptedEndpoint, Shown, by_colour
 import robospa
 from robospa.baselines.agent import endpoint as module
 from robospa.baselines.agent.endpoint import Away, EndpointError
-from robospa.baselines.agent.policy import Agent, AgentOptions, Agents
+from robospa.baselines.agent.policy import Agent, AgentOptions, Agents, read_answer
 from robospa.protocol.client import connect
 from robospa.protocol.errors import PolicyAnswerError, PolicyError
+from robospa.protocol.options import read_options
 from robospa.protocol.policy import USAGE, TrialInfo
 from robospa.protocol.server import ServerThread
 from robospa.results.scoring.models import results_of_run
@@ -177,6 +178,17 @@ def test_what_cannot_work_is_said_at_the_start(
 ) -> None:
     with pytest.raises(EndpointError, match=words):
         Agents(replace(AgentOptions(endpoint=scripted.url, model="scripted"), **given))
+
+
+@pytest.mark.parametrize("given", ["deadline=0", "parallel=0", "max_tokens=0", "price_in=-1"])
+def test_options_with_which_no_question_is_answered_are_refused(given: str) -> None:
+    with pytest.raises(ValueError, match="and must be"):
+        read_options(AgentOptions, dict([given.split("=")]))
+
+
+def test_a_note_may_have_lines(scripted: ScriptedEndpoint) -> None:
+    said = '{"note": "red is\nleft", "calls": [{"skill": "done"}]}'
+    assert read_answer([said], agent(scripted).spec) == ("red is left", [{"skill": "done"}])
 
 
 def test_of_200_trials_with_bad_answers_none_is_lost_or_scored_wrongly() -> None:
