@@ -75,7 +75,7 @@ def evaluate(
     A trial that cannot be run is retried and, if that does not help, reported as missing: it never
     counts as a failure. After Ctrl-C, the same command with --resume continues.
     """
-    from robospa.harness.running.request import goes_on, make_request
+    from robospa.harness.running.request import goes_on, interrupted, make_request
 
     settings = EvaluationSettings() if config is None else read_settings(config)
     changes = {name: value for name, value in given_flags(context).items() if name in given}
@@ -89,6 +89,9 @@ def evaluate(
     if latency is not None:
         _curve(settings, _milliseconds(latency), token, resume or auto_resume, as_json)
         return
+    if not resume and interrupted(settings):
+        aside(f"going on with the run in {settings.out}, which was begun with the same command")
+        resume = True
     run_and_show(make_request(settings, token=token, resume=resume), as_json=as_json)
 
 

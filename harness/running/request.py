@@ -18,16 +18,19 @@ from robospa.harness.running.status import cores, most_workers
 from robospa.harness.running.worker import Targets, WorkerConfig, each
 from robospa.harness.selection import list_trials, seed_sources
 from robospa.harness.settings import (
+    FILE,
     Compute,
     Connection,
     EvaluationSettings,
     SettingsError,
     flat,
+    to_toml,
 )
 from robospa.harness.worlds import SAPIEN_NAME, WorldKind, world_kind
 from robospa.protocol.errors import printable
 from robospa.registry import UnknownName
 from robospa.results.records.manifest import MANIFEST
+from robospa.results.records.runs import read_run
 from robospa.trial import TrialKey
 
 HELD = 3
@@ -107,6 +110,18 @@ def goes_on(resume: bool | str, out: Path | None) -> bool:
     if resume not in (True, False, "auto"):
         raise SettingsError(f'resume is {resume!r}: give True, False or "auto"')
     return out is not None and (out / MANIFEST).exists() if resume == "auto" else bool(resume)
+
+
+def interrupted(settings: EvaluationSettings) -> bool:
+    """Whether `out` holds an unfinished run of exactly these `settings` and of a policy that says
+    which weights it has: others are refused then, so that going on is safe."""
+    file = (settings.out or Path()) / FILE
+    asked = to_toml(replace(settings, timing=frozen_timing(settings.timing)))
+    if settings.out is None or not file.exists() or file.read_text("utf-8") != asked:
+        return False
+    run = read_run(settings.out)
+    kept = run.manifest.settings
+    return not kept.policies and bool(kept.policy.spec.get("checkpoint")) and bool(run.missing)
 
 
 def check_servers(settings: EvaluationSettings) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ import pytest
 from command_line import eval_words, robospa, start
 from fake_runs import results
 from numpy.typing import NDArray
-from run_fakes import FakePolicy, NanPolicy
+from run_fakes import SPEC, FakePolicy, NanPolicy
 
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread
@@ -51,7 +52,7 @@ class Gate:
                 gate.opened.wait(0.5)
                 return 0 * answer
 
-        return Gated()
+        return Gated(replace(SPEC, checkpoint="c1"))
 
 
 def test_a_server_is_evaluated_and_reported(tmp_path: Path) -> None:
@@ -141,7 +142,7 @@ def test_ctrl_c_leaves_a_run_that_can_be_resumed(tmp_path: Path) -> None:
         before = read_run(tmp_path / "run")
         assert 0 < len(before.missing) < 120
 
-        code, _, err = robospa(*words)
+        code, _, err = robospa(*words, "--timeout", "50")
         assert code == 1
         assert "already holds a run" in err
 
@@ -149,8 +150,10 @@ def test_ctrl_c_leaves_a_run_that_can_be_resumed(tmp_path: Path) -> None:
         assert code == 1
         assert "split" in err and "trials: 120 new and 120 gone" in err
 
-        code, _, err = robospa(*words, "--resume")
-    assert code == 0, err
+        code, _, err = robospa(*words)  # the same command of a policy that names its weights
+    assert code == 0 and f"going on with the run in {tmp_path / 'run'}" in err
+    code, _, err = robospa(*words)
+    assert code == 1 and "already holds a run" in err  # it is finished
     records = results(tmp_path / "run")
     assert len(records) == len({r.key for r in records}) == 120
 
