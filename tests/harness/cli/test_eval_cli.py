@@ -31,7 +31,8 @@ quickly = pytest.mark.usefixtures("world_asked_here")
 class Gate:
     """A server's policies that get nowhere from the seventh trial on, until it is open."""
 
-    def __init__(self) -> None:
+    def __init__(self, checkpoint: str = "") -> None:
+        self.spec = replace(SPEC, checkpoint=checkpoint)
         self.trials = itertools.count()
         self.reached = threading.Event()
         self.opened = threading.Event()
@@ -52,7 +53,7 @@ class Gate:
                 gate.opened.wait(0.5)
                 return 0 * answer
 
-        return Gated(replace(SPEC, checkpoint="c1"))
+        return Gated(self.spec)
 
 
 def test_a_server_is_evaluated_and_reported(tmp_path: Path) -> None:
@@ -128,7 +129,7 @@ def heeds_ctrl_c() -> Iterator[None]:
 
 @pytest.mark.usefixtures("heeds_ctrl_c")
 def test_ctrl_c_leaves_a_run_that_can_be_resumed(tmp_path: Path) -> None:
-    gate = Gate()
+    gate = Gate("c1")
     with ServerThread(policy_factory=gate.policy) as server:
         words = eval_words(tmp_path / "run", server.url, trials=60)
         process = start(words)
