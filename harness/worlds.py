@@ -86,6 +86,11 @@ class SapienKind(WorldKind):
     draws = True
     shared = True
 
+    def check(self, settings: EvaluationSettings) -> None:
+        super().check(settings)
+        if (world := settings.simulation.world) != self.name:
+            raise SettingsError(f"--world {world}: {self.name} takes no options")
+
     def arguments(self, settings: EvaluationSettings) -> dict[str, object]:
         """Whether it draws (when first needed), and how actions are executed."""
         control = settings.simulation.control

@@ -297,8 +297,11 @@ def parse_official(
     """The options that `world` names, and the layout they make on this machine. Raises
     SettingsError if official objects are asked for, by an option or by an archive that is `named`,
     and not there; or if the archive lacks something of `tasks`."""
+    name, _, given = world.partition("?")
+    if name != NAME:
+        raise SettingsError(f"--world {world}: options are written {NAME}?settle=official")
     try:
-        options = read_options(OfficialOptions, url_options(world.partition("?")[2]))
+        options = read_options(OfficialOptions, url_options(given))
         chosen(options.switches)
     except ValueError as error:
         raise SettingsError(f"--world {world}: {error}") from error

@@ -355,7 +355,7 @@ def index(archive: Archive) -> Index:
                 text = fault(archive, model)
                 if not text and is_filled(archive, model):
                     closed.setdefault(asset, []).append(model.name)
-            except (ArchiveError, OSError) as error:
+            except ArchiveError as error:
                 text = str(error)
             if text:
                 faults[model.name], unusable[asset] = text, model.folder

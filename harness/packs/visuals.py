@@ -174,7 +174,8 @@ def check_robot(archive: Archive, robot: Embodiment) -> None:
 
 
 def _robot_urdf(archive: Archive, robot: Embodiment) -> Urdf:
-    folder = archive.root / "embodiments" / robot.name
+    kind = robot.name.partition(":")[0]  # its arms may stand farther apart
+    folder = archive.root / "embodiments" / kind
     if not folder.is_dir():
         raise ArchiveError(
             f"there are no meshes of {robot.name} in {str(archive.root / 'embodiments')!r}; unpack "

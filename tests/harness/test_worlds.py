@@ -57,6 +57,8 @@ def test_only_the_official_world_has_an_archive_and_vendors_robots() -> None:
             kind.check(given)
         with pytest.raises(SettingsError, match="assets"):
             kind.check(settings(assets="."))
+    with pytest.raises(SettingsError, match="sapien takes no options"):
+        SAPIEN.check(settings(world="sapien?settle=official"))
 
 
 def test_who_opens_a_world_may_say_whether_it_draws_where_it_can(

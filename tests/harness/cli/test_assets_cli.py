@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from command_line import robospa
-from made_archive import make_archive
+from made_archive import READS_MESHES, make_archive
 
 ASSETS = ("official", "assets")
 
@@ -38,3 +38,13 @@ def test_a_torn_file_is_one_sentence(tmp_path: Path) -> None:
     data = json.loads(robospa(*ASSETS, root, "--json").out)
     assert "unpack the archive again" in data["faults"]["071_can/base3"]
     assert data["missing"]["Pick_Cans_Relational"] == ["071_can"]
+
+
+@READS_MESHES
+def test_a_cache_that_cannot_be_written_is_no_fault_of_the_models(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("ROBOSPA_CACHE", str(tmp_path / "file"))
+    code, _, err = robospa(*ASSETS, make_archive(tmp_path / "assets", ["bowl"]))
+    assert code == 1 and "file/packs" in err and "Not a directory" in err

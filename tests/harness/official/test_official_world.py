@@ -152,6 +152,8 @@ def test_without_an_archive_it_says_so(tmp_path: Path, monkeypatch: pytest.Monke
     assert layout.suite == BUILTIN_SUITE and layout.manifest_settings().switches == ["pure-colors"]
     (said,) = layout.warnings(official_sentences=False)
     assert said.startswith("objects are built in") and str(tmp_path) in said
+    with pytest.raises(SettingsError, match="options are written official"):
+        parse_official("official:settle=official")
     for wrong in ("switches=gap", "settle=long", "speed=2"):
         with pytest.raises(SettingsError, match=r"--world official\?"):
             parse_official(f"official?{wrong}")

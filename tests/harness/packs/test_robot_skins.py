@@ -69,6 +69,12 @@ def test_meshes_are_thinned_or_full(tmp_path: Path) -> None:
     assert thin <= 9 * 1500 < full
 
 
+def test_a_robot_whose_arms_stand_farther_apart_has_the_same_meshes(tmp_path: Path) -> None:
+    archive = open_archive(make_robot(tmp_path, "piper"))
+    usual, wide = (robot_skins(archive, embodiment(name)) for name in ("piper", "piper:0.75"))
+    assert usual == wide and usual.arms[0]
+
+
 def test_what_is_missing_is_named(tmp_path: Path) -> None:
     archive = open_archive(make_robot(tmp_path, "piper"))
     with pytest.raises(ArchiveError, match=r"no meshes of ARX-X5 in .* unpack embodiments\.zip"):
@@ -82,7 +88,7 @@ def test_a_run_knows_before_its_first_trial_what_of_a_robot_is_missing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ROBOSPA_ASSETS", str(make_robot(tmp_path, "piper")))
-    check_robots(["piper"])
+    check_robots(["piper", "piper:0.75"])
     with pytest.raises(SettingsError, match="no meshes of aloha-agilex"):
         check_robots(["piper", "aloha-agilex"])
     (tmp_path / "embodiments" / "piper" / "urdf" / "meshes" / "root.glb").unlink()
