@@ -149,16 +149,17 @@ class Agent:
         self.options, self._endpoint, self._totals = options, endpoint, totals
         self.spec = spec_of(options)
         self._trial: Trial | None = None
+        self._sums: Usage = {}
 
     def reset(self, trial: TrialInfo) -> None:
         """Forget the trial before."""
         self._trial = Trial(trial)
-        self._totals.setdefault(trial.id, dict.fromkeys(USAGE, 0))
+        self._sums = self._totals.setdefault(trial.id, dict.fromkeys(USAGE, 0))
 
     @property
     def last_timing(self) -> Mapping[str, float]:
         """What the trial has used, its earlier attempts included."""
-        return {**self._totals[self._trial.info.id]} if self._trial else {}
+        return {**self._sums}
 
     def infer(self, observation: Observation) -> list[dict[str, object]]:
         """The next calls. Raises PolicyAnswerError, and Away where the endpoint is."""
@@ -217,7 +218,7 @@ class Agent:
 
     def _count(self, used: Usage) -> None:
         assert self._trial is not None
-        for sums in (self._trial.used, self._totals[self._trial.info.id]):
+        for sums in (self._trial.used, self._sums):
             sums.update({name: sums[name] + value for name, value in used.items()})
 
     def _used_up(self, trial: Trial) -> bool:

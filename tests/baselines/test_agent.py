@@ -137,7 +137,9 @@ def test_what_lost_attempts_have_used_is_in_the_next_one(scripted: ScriptedEndpo
         one.reset(TRIAL)
         one.infer(seen())
         assert one.last_timing["requests"] == attempt
+    (lost := agents()).reset(TRIAL)
     one.end({})
+    assert lost.infer(seen()) == [PICK]  # its connection may have lost the trial, or be another run
     one.reset(TRIAL)
     assert set(one.last_timing.values()) == {0}
 
