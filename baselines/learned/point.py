@@ -186,6 +186,11 @@ def _read(words: Told, query: Tensor) -> Tensor:
     return read.transpose(1, 2).flatten(2)
 
 
+def _mean(x: Tensor, real: Tensor) -> Tensor:
+    """(B, C): of those of the objects (B, N, C) that are `real` (B, N)."""
+    return (x * real[..., None]).sum(dim=1) / real.sum(dim=1, keepdim=True).clamp(min=1)
+
+
 def _heads(words: Tensor, said: Tensor) -> Told:
     """Of words (B, L, 2 C), keys before values, and which are `said` (B, L)."""
     key, value = words.unflatten(2, (2 * HEADS, -1)).transpose(1, 2).chunk(2, dim=1)
@@ -240,15 +245,13 @@ class ObjectLayer(nn.Module):
         self.joined = nn.Linear(pair + 2 * width, width)
         self.alone = _twice(width, 2 * width, width)
 
-    def control(self, words: Told, before: Tensor, pooled: Tensor) -> Tensor:
-        """(B, C): what this layer reads."""
-        query = self.query(torch.cat([before, pooled], dim=1)) + self.start
-        return _read(words, query[:, None])[:, 0]
-
     def forward(
         self, x: Tensor, relations: Tensor, real: Tensor, control: Tensor, words: Told
-    ) -> Tensor:
-        """(B, N, C), of the same shape. Each object reads for itself, too: how often, as which."""
+    ) -> tuple[Tensor, Tensor]:
+        """Objects (B, N, C) and what is read next (B, C), of the same shapes. Each object reads for
+        itself, too: how often, as which."""
+        query = self.query(torch.cat([control, _mean(x, real)], dim=1)) + self.start
+        control = _read(words, query[:, None])[:, 0]
         scale, shift = self.film(control)[:, None].chunk(2, dim=2)
         here = F.relu(self.before(x) * (1 + scale) + shift)
         read = _read(words, self.ask(here))
@@ -258,8 +261,7 @@ class ObjectLayer(nn.Module):
         pair = F.relu(pair + self.here(aware)[:, :, None] + self.there(aware)[:, None])
         pair = pair * torch.sigmoid(self.gate(pair)) * real[:, None, :, None]
         x = x + self.joined(torch.cat([pair.sum(dim=2) / 4, here, read], dim=2))
-        out: Tensor = x + self.alone(x)
-        return out
+        return x + self.alone(x), control
 
 
 @dataclass(frozen=True)
@@ -305,9 +307,7 @@ class PointNetwork(nn.Module):
         control = words[:, -2] + words[:, -1]
         hops = []
         for i, layer in enumerate(self.layers):
-            pooled = (x * real[..., None]).sum(dim=1) / real.sum(dim=1, keepdim=True).clamp(min=1)
-            control = layer.control(told, control, pooled)
-            x = layer(x, between, real, control, told)
+            x, control = layer(x, between, real, control, told)
             if i < LAYERS - 1:
                 like = (x * self.hop[i](control)[:, None]).sum(dim=2) / math.sqrt(x.shape[2])
                 like = like.masked_fill(~batch.real, LOW)
@@ -317,8 +317,7 @@ class PointNetwork(nn.Module):
                 x = x + self.hopped[i](torch.cat([way, there, share[..., None]], dim=2))
                 hops.append(like)
         pooled = x.masked_fill(~batch.real[..., None], LOW).amax(dim=1).clamp(min=-20)
-        mean = (x * real[..., None]).sum(dim=1) / real.sum(dim=1, keepdim=True).clamp(min=1)
-        kinds = self.deed(torch.cat([control, pooled, mean], dim=1))
+        kinds = self.deed(torch.cat([control, pooled, _mean(x, real)], dim=1))
         every = torch.cat([control, kinds.detach().softmax(dim=1)], dim=1)[:, None]
         liked = self.object(torch.cat([x, every.expand(-1, x.shape[1], -1)], dim=2))[..., 0]
         liked = liked.masked_fill(~batch.real, LOW)
@@ -349,7 +348,7 @@ class PointNetwork(nn.Module):
         """(B, cells): liking of each cell when the object is that (B,)."""
         x, control, _ = answer.features
         rows = torch.arange(len(x))
-        mean = (x * batch.real[..., None]).sum(dim=1) / batch.real.sum(dim=1, keepdim=True)
+        mean = _mean(x, batch.real.float())
         now = seen_features(batch.tokens[rows, chosen, :SEEN_WIDTH])
         told = self.place(torch.cat([control, x[rows, chosen], mean, now], dim=1))
         query, ahead, aside = told.split([64, WAVES, WAVES], dim=1)

@@ -133,8 +133,7 @@ def seen_at(kind: str, made: ObjectModel, pose: Pose, hinge: float = 0.0) -> See
 def labelled(scene: Scene, rng: np.random.Generator | None = None) -> list[tuple[State, Step]]:
     """All states of the scene's plan, each with its next step; the last one is done. With `rng`,
     the things are moved in an order of its own."""
-    items = in_order(scene)
-    every = tuple(map(tracked, items))
+    every = tuple(map(tracked, in_order(scene)))
     state = State(tuple(one for one in every if one.at_start))
     later = every[len(state.objects) :]
     plan, found = numbered(scene), list[tuple[State, Step]]()
