@@ -256,20 +256,21 @@ class Belief:
                     self.put(hold.number, FALLEN * self._end(arm, row) * hold.offset)
                     self.held[arm] = None
             self.last = row
-        empty = {h.number for arm, h in enumerate(self.held) if h and self._shut(arm, observation)}
+        shut = [
+            h.number for arm, h in enumerate(self.held) if h and self._shut(arm, h, observation)
+        ]
         for arm, hold in enumerate(self.held):
-            if hold is not None and hold.number in empty:
+            if hold is not None and hold.number in shut:
                 self.put(hold.number, hold.before)
                 self.held[arm] = None
             elif hold is not None:
                 end = pose_of_row(observation["ee"][arm, :7])
                 self.put(hold.number, end * hold.offset)
 
-    def _shut(self, arm: int, observation: Observation) -> bool:
+    def _shut(self, arm: int, hold: Grip, observation: Observation) -> bool:
         """Whether the fingers of an arm that should hold something came together."""
-        own, hold = self.robot.arms[arm], self.held[arm]
-        width = hold.width if hold is not None else 0.0
-        shut, full = (own.gripper_value(w) for w in (own.gripper.gap, width))
+        own = self.robot.arms[arm]
+        shut, full = (own.gripper_value(w) for w in (own.gripper.gap, hold.width))
         share = float(observation["state"][self.columns[arm].gripper])
         return share < shut + EMPTY * (full - shut)
 
@@ -286,13 +287,13 @@ class Belief:
         if any(abs(v) > s / 2 + AROUND for v, s in zip((x, y, z), made.size, strict=True)):
             return
         across = np.array(rotate(end.rotation, (0.0, 1.0, 0.0)))
-        options = [
-            (math.dist(g.point, point) - 0.1 * abs(float(np.dot(g.closing, across))), g)
-            for g in world_grasps(made, pose, hand)
-        ]
-        if not options:
+        best = min(
+            world_grasps(made, pose, hand),
+            key=lambda g: math.dist(g.point, point) - 0.1 * abs(float(np.dot(g.closing, across))),
+            default=None,
+        )
+        if best is None:
             return
-        best = min(options, key=lambda option: option[0])[1]
         shift = across * float(np.dot(point - np.array(best.point), across))
         px, py, pz = (np.array(pose.position) + shift).tolist()
         offset = end.inverse() * Pose((px, py, pz), pose.rotation)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from robospa.action_space import ARMS
 from robospa.baselines.learned import steps
-from robospa.baselines.learned.steps import KINDS, TYPES, Seen, State, Step, Tracked
+from robospa.baselines.learned.steps import KINDS, TYPES, Seen, State, Step
 from robospa.geometry import Pose
 from robospa.harness.robots import embodiment
 from robospa.harness.running.atomic_file import replace_file
@@ -114,22 +114,18 @@ def lesson(scene: Scene) -> Lesson:
     last = np.array([last_of(state) for state, _ in pairs], np.int16)
     every = sentences(scene, "train")
     told = tuple(every[int(i)] for i in rng.permutation(len(every))[:TOLD])
-    clutter = lying_about(scene)
-    tokens = [tokens_of(among(state, clutter)) for state, _ in pairs]
+    tokens = [tokens_of(among_clutter(state, scene)) for state, _ in pairs]
     where = variants().index((scene.task, scene.level))
     return Lesson(tokens, answers, last, told, where)
 
 
-def lying_about(scene: Scene) -> tuple[Tracked, ...]:
-    """The clutter that the head camera shows; nothing is done with it."""
+def among_clutter(state: State, scene: Scene) -> State:
+    """The state with the clutter that the head camera shows behind its objects, of which a wall may
+    hide some; nothing is done with it."""
     every = [steps.tracked(item) for item in scene.clutter if item.asset in KINDS]
-    return tuple(one for one in every if steps.in_picture(one.now))
-
-
-def among(state: State, clutter: tuple[Tracked, ...]) -> State:
-    """The state with clutter behind its objects, of which a wall may hide some."""
-    every = steps.hidden(replace(state, objects=state.objects + clutter)).objects
-    return replace(state, objects=state.objects + every[len(state.objects) :])
+    clutter = tuple(one for one in every if steps.in_picture(one.now))
+    shown = steps.hidden(replace(state, objects=state.objects + clutter)).objects
+    return replace(state, objects=state.objects + shown[len(state.objects) :])
 
 
 def _answer(step: Step, refers: int | None) -> tuple[float, ...]:
@@ -194,7 +190,7 @@ def picture(scene: Scene, state: State) -> Picture:
     poses |= {o.name: o.pose for o in scene.clutter}
     renderer.sync(scene, embodiment(scene.embodiment))
     image = renderer.render([CameraSpec("head", WIDTH, HEIGHT)], links, poses, hinges)[0]
-    every = [o.now for o in among(state, lying_about(scene)).objects if o.visible]
+    every = [o.now for o in among_clutter(state, scene).objects if o.visible]
     rows = [seen_numbers(one) for one in every if steps.in_picture(one)]
     packed = BytesIO()
     Image.fromarray(image).save(packed, "PNG", compress_level=1)
