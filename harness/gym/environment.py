@@ -15,6 +15,7 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 from gymnasium.error import ResetNeeded
+from gymnasium.vector.utils import read_from_shared_memory
 from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace
@@ -288,6 +289,30 @@ FARTHEST = 3.0
 Bounds = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 
+class SentenceSpace(spaces.Text):
+    """Sentences that environments in processes of their own show as they are now: of its own text
+    Gymnasium keeps what was in the shared memory before the first reset."""
+
+
+class _Sentences(Sequence[str]):
+    """The present sentences of several environments, in shared memory; copied, a tuple."""
+
+    def __init__(self, space: SentenceSpace, memory: Any, n: int = 1) -> None:
+        self._place = (space, memory, n)
+
+    def __deepcopy__(self, memo: object) -> tuple[str, ...]:
+        return tuple(read_from_shared_memory.dispatch(spaces.Text)(*self._place))
+
+    def __getitem__(self, place: Any) -> Any:
+        return self.__deepcopy__(None)[place]
+
+    def __len__(self) -> int:
+        return self._place[2]
+
+
+read_from_shared_memory.register(SentenceSpace, _Sentences)  # type: ignore[arg-type]
+
+
 def check_spec(spec: PolicySpec) -> None:
     """SettingsError for what an environment cannot give, and what no policy may ask for."""
     try:
@@ -356,6 +381,6 @@ def observation_space(spec: PolicySpec, robot: Embodiment, limit: int) -> spaces
     parts["ee"] = spaces.Box(low, high, dtype=np.float32)
     if spec.environment_state:
         parts["environment_state"] = spaces.Box(-np.inf, np.inf, (WIDTH,), np.float32)
-    parts["instruction"] = spaces.Text(SENTENCE, charset=LETTERS)
+    parts["instruction"] = SentenceSpace(SENTENCE, charset=LETTERS)
     parts["step"] = spaces.Discrete(limit + 1)
     return spaces.Dict(parts)

@@ -161,6 +161,8 @@ def test_environments_in_processes_of_their_own() -> None:
         observation, info = envs.reset(seed=100000)
         assert observation["images"]["head"].shape == (2, 6, 8, 3)
         assert list(info["seed"]) == [100000, 100001]
+        assert observation["instruction"] == tuple(info["instruction"])
+        assert list(envs.observations["instruction"]) == list(info["instruction"])
         _, rewards, terminated, _, info = envs.step(np.stack([ONES, ONES]))
         assert list(rewards) == [1.0, 0.0] and list(terminated) == [True, False]
         assert list(info["success"]) == [True, False]
