@@ -82,6 +82,8 @@ def _run(words: list[str]) -> None:
     line = os.environ.get("_TYPER_COMPLETE_ARGS") or os.environ.get("COMP_WORDS", "")
     typed = line.split()[1:] if COMPLETION in os.environ else words
     chosen = next((w for w in typed if not w.startswith("-")), "")
+    if strange := next((w for w in words if any("\ud800" <= c <= "\udfff" for c in w)), ""):
+        raise ValueError(f"{strange!a} is not UTF-8, in which names of files and folders are kept")
     if "--version" in words[:1]:
         from importlib.metadata import version
 

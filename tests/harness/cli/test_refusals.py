@@ -45,6 +45,7 @@ REFUSED = [
     ("serve hold --option size=1", "(see robospa serve hold --show-options)"),
     ("report a --trials", "a is not a run: it has no run.json"),
     ("eval hold --latency 0,100", "--out"),
+    ("eval hold --out run\udcff", r"'run\udcff' is not UTF-8"),
 ]
 REFUSED += [
     (f"eval hold --out run --latency={given}", "two or more growing numbers")
