@@ -53,6 +53,7 @@ if TYPE_CHECKING:
 
 TEST_SHARE = 10
 """Questions of a variant for training to each one for testing."""
+CARD = "README.md"
 Row = dict[str, object]
 Mask = NDArray[np.bool_]
 
@@ -113,16 +114,22 @@ def collect_questions(
 ) -> int:
     """Make the data set in `out` as far as it is not there; its number of questions.
 
-    SettingsError if no task of `settings` asks a question.
+    SettingsError if no task of `settings` asks a question, or if `out` holds anything else.
     """
     files = list(_files(settings, out))
+    there = {*out.glob("[!.]*"), *out.glob("data/[!.]*")} - {out / "data", out / CARD}
+    if others := sorted(there - {file.path for file in files if file.done}):
+        raise SettingsError(
+            f"{out} has {others[0].relative_to(out)}, which is not of these questions, or is of "
+            "other settings or versions; choose another --out"
+        )
     pending = [file for file in files if not file.done]
     start = partial(JobProcess, file_maker, None, name="questions")
     with Pool[QuestionFile, int](start, min(workers, len(pending))) as pool:
         for job, file in [(pool.submit(file), file) for file in pending]:
             say(f"{file.path.name}: {size_text(job.result())}")
     counts = [need("pyarrow.parquet").read_metadata(file.path).num_rows for file in files]
-    replace_file(out / "README.md", _card(settings, files, counts).encode())
+    replace_file(out / CARD, _card(settings, files, counts).encode())
     return sum(counts)
 
 

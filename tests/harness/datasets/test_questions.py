@@ -2,6 +2,7 @@
 
 import io
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +43,9 @@ def test_questions_say_what_their_pictures_show_and_where(tmp_path: Path) -> Non
     said.clear()
     collect_questions(settings, tmp_path, 1, said.append)
     assert not said  # all of it is there
+    for other in (replace(settings, episodes=4), Collection("Basic_Color_Blocks", "5", 3)):
+        with pytest.raises(SettingsError, match="other settings or versions; choose another"):
+            collect_questions(other, tmp_path, 1, said.append)
     shutil.rmtree(tmp_path / "data")
     collect_questions(settings, tmp_path, 2, said.append)
     assert (tmp_path / "data/test-Pick_Blocks_Size.parquet").read_bytes() == before
