@@ -84,14 +84,18 @@ def main() -> None:
     )
     parser.add_argument("--robots", help="such as piper,ur5-wsg; else all")
     parser.add_argument("--modes", help="clean or randomized; else both")
+    parser.add_argument("--tasks", help="such as spatial or RPF,OFE, as of robospa eval; else all")
     parser.add_argument("--minutes", type=float, help="go on with no further list after so long")
     parser.add_argument("--workers", type=int, default=cores())
     options = parser.parse_args()
     robots, modes = (text and text.split(",") for text in (options.robots, options.modes))
+    tasks = set(parse_tasks(options.tasks)) if options.tasks else None
     keys = [
         key
         for key in shipped()
-        if key.embodiment in (robots or [key.embodiment]) and key.mode in (modes or [key.mode])
+        if key.embodiment in (robots or [key.embodiment])
+        and key.mode in (modes or [key.mode])
+        and key.task in (tasks or [key.task])
     ]
     lists = {key: read_levels(LISTS / key.file).get(key.level, ()) for key in keys}
     missing = [key for key, seeds in lists.items() if len(seeds) < PER_VARIANT]
