@@ -26,6 +26,7 @@ from typing import TypeVar
 
 from robospa.observation import Observation
 from robospa.protocol.batching import Answer, Batcher
+from robospa.protocol.errors import DecodeError
 from robospa.protocol.policy import USAGE, Policy, PolicySpec, TrialInfo, has
 
 T = TypeVar("T")
@@ -147,8 +148,8 @@ class PolicySession:
 
 
 def spec_of(policy: Policy) -> PolicySpec:
-    """What `policy` reads and answers; ValueError, saying what to write, if it does not say or
-    lacks a method."""
+    """What `policy` reads and answers; ValueError, saying what to write, if it does not say,
+    says what cannot be, or lacks a method."""
     found, name = getattr(policy, "spec", None), type(policy).__name__
     if not isinstance(found, PolicySpec):
         raise ValueError(
@@ -158,6 +159,10 @@ def spec_of(policy: Policy) -> PolicySpec:
     for method in () if has(policy, "infer_batch") else ("reset(trial)", "infer(observation)"):
         if not callable(getattr(policy, method.partition("(")[0], None)):
             raise ValueError(f"{name} has no method {method}, which every policy needs")
+    try:
+        PolicySpec.from_json(found.to_json())  # the rules are those of the wire
+    except DecodeError as error:
+        raise ValueError(f"{name}.{error}") from None
     return found
 
 

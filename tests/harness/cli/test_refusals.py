@@ -125,6 +125,11 @@ WRONG_MODULES = [
         "    def reset(self, trial): ...",
         "Mine has no method infer(observation), which every policy needs",
     ),
+    (
+        "import robospa\nclass Mine:\n    spec = robospa.PolicySpec('mine', state='joints')\n"
+        "    def reset(self, trial): ...\n    def infer(self, observation): ...",
+        "Mine.spec: 'state' must be one of commanded, measured, none, not 'joints'",
+    ),
 ]
 
 
