@@ -80,21 +80,24 @@ def pack(
     """
     reference = rules.shipped(world, parts)
     about = card.read_card(model)
-    how = packing.Packing(
+    note, done, bundles = aside if as_json else print, scene_progress(), []
+    for valid in packing.pack(
+        run,
+        about,
+        out,
+        reference,
         practice=practice,
         videos=videos,
         replace_old=force,
-        note=aside if as_json else print,
-        done=scene_progress(),
-    )
-    bundles = []
-    for packed in packing.pack(run, about, out, reference, how):
-        validity = packed.valid.evidence
+        note=note,
+        done=done,
+    ):
+        path, validity = valid.path, valid.evidence
+        size = path.stat().st_size
+        bundles.append({"path": path, "bytes": size, "evidence": validity})
         if as_json:
-            size = {"path": packed.valid.path, "bytes": packed.size}
-            bundles.append({**size, "evidence": validity})
             continue
-        print(f"{packed.valid.path}: {packed.size / 1e6:.1f} MB, {validity.trials} trials")
+        print(f"{path}: {size / 1e6:.1f} MB, {validity.trials} trials")
         for warning in validity.warnings:
             print(warning)
         print(f"bundle {validity.bundle}")

@@ -198,7 +198,11 @@ def published_entries() -> list[Entry]:
 def entry_of(submission: Submission) -> Entry:
     """The entry of a submission; BundleError if its scores do not hold together."""
     card, run, evidence = submission.card, submission.run, submission.evidence
-    column = _column(submission)
+    results = results_of(card.name, submission.outcomes, run)
+    if found := compare_scores(to_json(results.scores), submission.scores):
+        where = f"the submission {submission.folder.name}: scores.json"
+        raise BundleError(f"{where} does not hold together: {found}")
+    column = Column(replace(results, trials={}))  # 28,000 records of every submission
     training, actions = card.training, card.actions
     demonstrations = ", ".join(map(str, training.demonstrations))
     about = (
@@ -253,15 +257,6 @@ def short_count(count: int) -> str:
     return str(count)
 
 
-def _column(submission: Submission) -> Column:
-    """The submission's scores as a column, computed from the outcomes of its trials."""
-    where = f"the submission {submission.folder.name}: scores.json"
-    results = results_of(submission.card.name, submission.outcomes, submission.run)
-    if found := compare_scores(to_json(results.scores), submission.scores):
-        raise BundleError(f"{where} does not hold together: {found}")
-    return Column(replace(results, trials={}))  # 28,000 records of every submission
-
-
 def evidence_lines(evidence: BadgeEvidence) -> list[tuple[str, str]]:
     """What the badges rest on, as badge and sentence."""
     valid, again, fresh = evidence.valid, evidence.replayed, evidence.reproduced
@@ -285,14 +280,12 @@ def evidence_lines(evidence: BadgeEvidence) -> list[tuple[str, str]]:
 def page_values(entry: Entry) -> dict[str, dict[str, list[list[float] | int]]]:
     """Percent by metric, row and level (0: all levels) as [value, low, high], with digits enough to
     be rounded as elsewhere; 0 is no value."""
-    made: dict[str, dict[str, list[list[float] | int]]] = {}
-    rows = [*load().tasks, *CATEGORIES, *DIMENSIONS, rounding.OVERALL]
-    for metric in METRICS:
-        made[metric] = {}
-        for row in rows:
+    made: dict[str, dict[str, list[list[float] | int]]] = {metric: {} for metric in METRICS}
+    for metric, values in made.items():
+        for row in (*load().tasks, *CATEGORIES, *DIMENSIONS, rounding.OVERALL):
             found = [_shown(entry.column, metric, row, level) for level in (0, *LEVELS)]
             if any(found):
-                made[metric][row] = found
+                values[row] = found
     return made
 
 

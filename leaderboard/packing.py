@@ -10,7 +10,9 @@ already is taken as it is. Addresses and command lines stay at home.
 import os
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import ExitStack, closing
+from dataclasses import replace
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 
@@ -44,48 +46,55 @@ DATE = (1980, 1, 1, 0, 0, 0)
 Note = Callable[[str], None]
 
 
-@dataclass(frozen=True)
-class Packed:
-    """A bundle on disk, found valid, and its bytes."""
-
-    valid: Valid
-    size: int
-
-
-@dataclass(frozen=True)
-class Packing:
-    """How bundles are written. `practice`: the first few seeds of any variants are enough, and
-    `videos` may be left out; such a bundle says so and enters no leaderboard."""
-
-    practice: bool = False
-    videos: bool = True
-    replace_old: bool = False
-    note: Note = lambda text: None
-    done: Done = lambda count, trials: None
-
-
 def pack(
-    folders: Sequence[Path], card: Card, out: Path, reference: Reference, how: Packing = Packing()
-) -> list[Packed]:
+    folders: Sequence[Path],
+    card: Card,
+    out: Path,
+    reference: Reference,
+    *,
+    practice: bool = False,
+    videos: bool = True,
+    replace_old: bool = False,
+    note: Note = lambda text: None,
+    done: Done = lambda count, trials: None,
+) -> list[Valid]:
     """Write a bundle for each robot that the runs in `folders` are of, whole or not at all, and
     verify it.
 
     Of one robot it is `out`, of several NAME-ROBOT.zip where `out` is NAME.zip. None is written
-    before all are found fit to enter. A file that is there is kept unless `how.replace_old`, and
-    also then until the new one holds. Raises BundleError and RunError.
+    before all are found fit to enter. A file that is there is kept unless `replace_old`, and also
+    then until the new one holds. With `practice` the first few seeds of any variants are enough,
+    and `videos` may be left out; such a bundle enters no leaderboard. Raises BundleError and
+    RunError.
     """
     parts = _by_robot([read_run(folder) for folder in folders], out)
     for path in parts:
-        if path.exists() and not how.replace_old:
+        if path.exists() and not replace_old:
             raise BundleError(
                 f"{path} is already there; choose another name, or --force to replace it"
             )
-    if not how.videos and not how.practice:
+    if not videos and not practice:
         raise BundleError("videos can be left out of a bundle for practice only")
     whole = {path: merged(runs) for path, runs in parts.items()}
     for run in whole.values():
-        check_run(run, card, reference, how.practice)
-    return [_pack(parts[path], run, card, path, reference, how) for path, run in whole.items()]
+        check_run(run, card, reference, practice)
+    packed = []
+    for path, run in whole.items():
+        homes = {key: one.folder for one in parts[path] for key in one.keys}
+        part = path.with_name(f".{path.name}.{os.getpid()}.part")
+        try:
+            chosen = announced(reference.suite, run.keys) if videos else []
+            films = _films(run, chosen, reference, homes, note)
+            note("writing the bundle")
+            trace = partial(_trace, homes)
+            write_bundle(part, run, card, reference.suite, trace, films, practice)
+            note("verifying what was packed")
+            valid = verify(part, reference, practice, done=done)
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
+        packed.append(replace(valid, path=path))
+    return packed
 
 
 def _by_robot(runs: Sequence[Run], out: Path) -> dict[Path, list[Run]]:
@@ -102,34 +111,16 @@ def _by_robot(runs: Sequence[Run], out: Path) -> dict[Path, list[Run]]:
     }
 
 
-def _pack(
-    runs: Sequence[Run], run: Run, card: Card, out: Path, reference: Reference, how: Packing
-) -> Packed:
-    """Write, verify and rename the bundle of `run`, which `runs` make up."""
-    homes = {key: one.folder for one in runs for key in one.keys}
-    part = out.with_name(f".{out.name}.{os.getpid()}.part")
-
-    def trace(key: TrialKey) -> Trace:
-        kept = read_trace(action_path(homes[key], key))
-        actions = with_joints(kept.actions, kept.joints)
-        if not is_quantized(actions):
-            raise BundleError(
-                f"{key.slug} has actions finer than 1/{STEPS_PER_UNIT}, as runs of older "
-                "versions have: run it again with this one"
-            )
-        return actions
-
-    try:
-        chosen = announced(reference.suite, run.keys) if how.videos else []
-        films = _films(run, chosen, reference, homes, how.note)
-        how.note("writing the bundle")
-        write_bundle(part, run, card, reference.suite, trace, films, how.practice)
-        how.note("verifying what was packed")
-        valid = verify(part, reference, how.practice, done=how.done)
-        part.replace(out)
-    finally:
-        part.unlink(missing_ok=True)
-    return Packed(replace(valid, path=out), out.stat().st_size)
+def _trace(homes: Mapping[TrialKey, Path], key: TrialKey) -> Trace:
+    """What a trial executed, from the folder of its run."""
+    kept = read_trace(action_path(homes[key], key))
+    actions = with_joints(kept.actions, kept.joints)
+    if not is_quantized(actions):
+        raise BundleError(
+            f"{key.slug} has actions finer than 1/{STEPS_PER_UNIT}, as runs of older "
+            "versions have: run it again with this one"
+        )
+    return actions
 
 
 def merged(runs: Sequence[Run]) -> Run:
@@ -184,26 +175,6 @@ def _check_alike(first: Run, run: Run) -> None:
         )
 
 
-class _Writer:
-    """An archive that is being written, and what its manifest lists so far."""
-
-    def __init__(self, archive: zipfile.ZipFile) -> None:
-        self._archive = archive
-        self.files: dict[str, FileEntry] = {}
-
-    def add(self, name: str, data: bytes) -> None:
-        """Write a file and list it."""
-        self.files[name] = FileEntry(len(data), layout.sha256(data))
-        self.put(name, data)
-
-    def put(self, name: str, data: bytes) -> None:
-        """Write a file that the manifest does not list."""
-        entry = zipfile.ZipInfo(name, DATE)
-        entry.compress_type = zipfile.ZIP_STORED if name.endswith(".mp4") else zipfile.ZIP_DEFLATED
-        entry.external_attr = 0o100644 << 16
-        self._archive.writestr(entry, data)
-
-
 def write_bundle(
     path: Path,
     run: Run,
@@ -216,19 +187,31 @@ def write_bundle(
     """Write the bundle of `run` to `path` without looking at it; `trace` finds a trial's actions,
     `films` has the videos by name."""
     inputs = layout.inputs_hash(run.manifest)
+    files: dict[str, FileEntry] = {}
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
-        writer = _Writer(archive)
+
+        def add(name: str, data: bytes) -> None:
+            files[name] = FileEntry(len(data), layout.sha256(data))
+            _put(archive, name, data)
+
         for name, film in films.items():
-            writer.add(name, film)
-        lines = list(write_rows(_add_actions(writer, run, trace, films), inputs))
-        writer.add(layout.RECORDS, b"".join(line + b"\n" for line in lines))
+            add(name, film)
+        rows = list[TrialRow]()
+        for variant, group in groupby(run.keys, key=lambda key: key.variant):
+            traces = {key: trace(key) for key in group}
+            add(layout.actions_name(*variant), encode(list(traces.values())))
+            for key, actions in traces.items():
+                video = film_name(key) if film_name(key) in films else ""
+                rows.append((replace(run.records[key], video=video), trace_hash(actions)))
+        lines = list(write_rows(rows, inputs))
+        add(layout.RECORDS, b"".join(line + b"\n" for line in lines))
         for name, content in (
             (layout.RUN, run.manifest.to_json()),
             (layout.CARD, card),
             (layout.SCORES, scores_of(run)),
             (layout.OUTCOMES, outcomes_of(run)),
         ):
-            writer.add(name, layout.canonical(content))
+            add(name, layout.canonical(content))
         manifest = BundleManifest(
             format=layout.FORMAT,
             suite=suite,
@@ -236,25 +219,17 @@ def write_bundle(
             practice=practice,
             inputs=inputs,
             chain=RowChain(len(lines), layout.sha256(lines[-1])),
-            files=writer.files,
+            files=files,
         )
         name = layout.bundle_hash(to_builtins(manifest))
-        writer.put(layout.MANIFEST, layout.canonical(structs.replace(manifest, bundle=name)))
+        _put(archive, layout.MANIFEST, layout.canonical(structs.replace(manifest, bundle=name)))
 
 
-def _add_actions(
-    writer: _Writer, run: Run, trace: Callable[[TrialKey], Trace], films: Mapping[str, bytes]
-) -> list[TrialRow]:
-    """Write the actions of every variant; the rows of their trials."""
-    rows = []
-    for variant, group in groupby(run.keys, key=lambda key: key.variant):
-        traces = {key: trace(key) for key in group}
-        writer.add(layout.actions_name(*variant), encode(list(traces.values())))
-        for key, actions in traces.items():
-            film = film_name(key)
-            record = replace(run.records[key], video=film if film in films else "")
-            rows.append(TrialRow(record, trace_hash(actions)))
-    return rows
+def _put(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
+    entry = zipfile.ZipInfo(name, DATE)
+    entry.compress_type = zipfile.ZIP_STORED if name.endswith(".mp4") else zipfile.ZIP_DEFLATED
+    entry.external_attr = 0o100644 << 16
+    archive.writestr(entry, data)
 
 
 def _films(
@@ -270,8 +245,8 @@ def _films(
 
     films: dict[str, bytes] = {}
     parts = load_function(reference.parts)
-    world: World | None = None
-    try:
+    with ExitStack() as stack:
+        world: World | None = None
         for number, key in enumerate(chosen, 1):
             name = film_name(key)
             there = homes[key] / name
@@ -280,14 +255,11 @@ def _films(
                 continue
             note(f"filming {key.slug} ({number} of {len(chosen)})")
             if world is None:
-                world = open_world(reference.world, render=True)
+                world = stack.enter_context(closing(open_world(reference.world, render=True)))
             try:
                 films[name] = film(world, run.records[key], homes[key], parts=parts)
             except ReplayError as error:
                 raise BundleError(
                     f"{error}, so it cannot be filmed here: pack where it ran"
                 ) from error
-    finally:
-        if world is not None:
-            world.close()
     return films

@@ -14,7 +14,6 @@ import sys
 import tempfile
 import urllib.request
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 from urllib.parse import urlsplit
@@ -28,7 +27,6 @@ from robospa.leaderboard.submission import (
     EVIDENCE,
     HANDED_IN,
     SLUG,
-    Announced,
     check_recipes,
     check_weights,
     read_announced,
@@ -47,12 +45,8 @@ SECONDS = 60.0
 Fetch = Callable[[str, Path, int], None]
 
 
-@dataclass(frozen=True)
-class Change:
-    """A changed file: `status` is git's letter, A for an addition."""
-
-    status: str
-    path: str
+Change = tuple[str, str]
+"""A changed file: git's letter, A for an addition, and its path."""
 
 
 def read_changes(data: bytes) -> list[Change]:
@@ -64,10 +58,10 @@ def read_changes(data: bytes) -> list[Change]:
     words = data.decode("utf-8", "replace").split("\0")
     if words.pop() or len(words) % 2:
         raise BundleError(f"the list of changed files is not what `{DIFF}` writes")
-    changes = [Change(*pair) for pair in zip(words[::2], words[1::2], strict=True)]
-    if strange := [c for c in changes if c.status not in STATUSES or not c.path]:
+    changes = list(zip(words[::2], words[1::2], strict=True))
+    if strange := [status for status, path in changes if status not in STATUSES or not path]:
         raise BundleError(
-            f"the list of changed files has the status {strange[0].status[:20]!a}, which "
+            f"the list of changed files has the status {strange[0][:20]!a}, which "
             f"`{DIFF}` does not write"
         )
     return changes
@@ -79,18 +73,18 @@ def submitted(changes: Sequence[Change]) -> list[str]:
     BundleError if they touch a submission and anything else, change or delete a file, bring other
     files than these, or take a name that is not free.
     """
-    own = [c for c in changes if HOME in PurePosixPath(c.path).parents and c.path != README]
-    if own and (strange := [c for c in changes if c not in own]):
+    own = [(s, p) for s, p in changes if HOME in PurePosixPath(p).parents and p != README]
+    if own and (strange := [path for status, path in changes if (status, path) not in own]):
         raise BundleError(
             f"a submission adds a folder below {HOME} and changes nothing else; this one also "
-            f"changes {strange[0].path[:120]!a}"
+            f"changes {strange[0][:120]!a}"
         )
-    if touched := [c for c in own if c.status != ADDED]:
-        raise BundleError(
-            f"a submission only adds files; this one {STATUSES[touched[0].status]} "
-            f"{touched[0].path[:120]!a}"
-        )
-    names = sorted({_name_of(change.path) for change in own})
+    for status, path in own:
+        if status != ADDED:
+            raise BundleError(
+                f"a submission only adds files; this one {STATUSES[status]} {path[:120]!a}"
+            )
+    names = sorted({_name_of(path) for _, path in own})
     for name in names:
         check_folder(name)
     return names
@@ -134,7 +128,11 @@ def check(
         more = ["--challenge", challenge] if challenge else []
         if announced.address == IN_REPOSITORY:
             check_weights(card, folder.name)
-            _take(folder, announced, path)
+            if (size := size_of(folder)) != announced.size:
+                raise BundleError(
+                    f"{folder / IN_REPOSITORY} has {size} bytes, not {announced.size}"
+                )
+            shutil.copyfile(folder / IN_REPOSITORY, path)
             more += ["--fraction", "1"] if challenge else []
         else:
             (get or fetch)(announced.address, path, announced.size)
@@ -143,7 +141,7 @@ def check(
         if done.returncode:
             raise BundleError(f"{folder.name}: the bundle was not verified, as said above")
         with BundleArchive(path) as archive:
-            packed = to_card(parse_map(archive.read(layout.CARD), layout.CARD))
+            packed = to_card(archive.read_map(layout.CARD))
     found = parse_map(evidence.read_bytes(), str(evidence))
     valid = found.get("valid")
     if not isinstance(valid, dict) or valid.get("bundle") != announced.bundle:
@@ -151,13 +149,6 @@ def check(
     if packed != card:
         raise BundleError(f"{folder / ASKED} is not the bundle's model card")
     return found
-
-
-def _take(folder: Path, announced: Announced, path: Path) -> None:
-    """Copy the bundle in `folder` to `path`; BundleError unless it has the announced size."""
-    if (size := size_of(folder)) != announced.size:
-        raise BundleError(f"{folder / IN_REPOSITORY} has {size} bytes, not {announced.size}")
-    shutil.copyfile(folder / IN_REPOSITORY, path)
 
 
 class _SecureOnly(urllib.request.HTTPRedirectHandler):

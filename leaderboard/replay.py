@@ -30,7 +30,6 @@ from robospa.leaderboard.evidence import APART, ReplayEvidence, drawn, what_it_c
 from robospa.leaderboard.rules import Reference, spec_of
 from robospa.leaderboard.traces import Trace, split_trace
 from robospa.leaderboard.verify import Valid, read_traces
-from robospa.results.records.manifest import RunAbout
 from robospa.results.records.runs import differences
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.first_choice import first_choice, held_at_start
@@ -45,6 +44,8 @@ LAST_BITS = {"digest", "physics_steps", "steps", "actions_digest"}
 """What may be others on another processor, where the same end may come earlier."""
 FROM_EVENTS = {"first choice": first_choice, "subtasks at the start": held_at_start}
 """Outcomes that no field of a record says."""
+SAME = ("versions", "code")
+"""What of run and installation decides the bits."""
 LOST = 1e6
 """How far apart things lie [mm] of which a record says nonsense."""
 
@@ -118,7 +119,10 @@ def replay(
             raise BundleError(
                 "the simulator does not run here, or crashed: `robospa check` says what is missing"
             ) from None
-    trials = tuple(found[key] for key in keys)
+    trials, about = tuple(found[key] for key in keys), valid.run.manifest.about
+    before, now = (
+        {name: getattr(one, name) for name in SAME} for one in (about, about_machine({}))
+    )
     kinds = Counter(trial.kind for trial in trials)
     apart = [trial.apart for trial in trials if trial.apart is not None]
     evidence = ReplayEvidence(
@@ -129,9 +133,9 @@ def replay(
         identical=kinds[IDENTICAL],
         agrees=kinds[AGREES],
         different=kinds[DIFFERENT],
-        changed_versions=_changed(valid.run.manifest.about),
+        changed_versions=tuple(changed_settings(before, now)),
         different_trials=tuple(trial.key.slug for trial in trials if trial.kind == DIFFERENT),
-        ran_on=valid.run.manifest.about.processors,
+        ran_on=about.processors,
         played_on=this_processor(),
         placed=len(apart),
         median=float(np.median(apart)) if apart else 0.0,
@@ -203,11 +207,3 @@ def _again(world: World, parts: Callable[[TrialKey], TrialSetup], job: Job) -> R
         text = " ".join(str(error).split())[:200]
         return Replayed(claimed.key, DIFFERENT, (), None, f"{type(error).__name__}: {text}")
     return judge(claimed, again)
-
-
-def _changed(about: RunAbout) -> tuple[str, ...]:
-    """Versions and code that differ between the run and this installation."""
-    before, now = (
-        {"versions": one.versions, "code": one.code} for one in (about, about_machine({}))
-    )
-    return tuple(changed_settings(before, now))

@@ -8,6 +8,7 @@ its own.
 import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cache, partial
 from itertools import groupby
@@ -34,6 +35,7 @@ from robospa.results.records.trial_record import TrialRecord
 from robospa.schema import read
 from robospa.tasks.instructions import SPLITS
 from robospa.tasks.scene import SUITE
+from robospa.tasks.task import Task
 from robospa.trial import REFERENCE, TrialKey
 
 LEVELS = (1, 2, 3, 4, 5)
@@ -42,25 +44,15 @@ Durations = Callable[[str, Trace], NDArray[np.int64]]
 
 
 @dataclass(frozen=True)
-class VariantFacts:
-    """What every record of a variant has to say, and the most actions a trial may take."""
-
-    category: str
-    candidates: int
-    subtasks: int
-    steps: int
-
-
-@dataclass(frozen=True)
 class Reference:
-    """`seeds` of a task, level, robot and scene mode, and `facts` of a task and level, raise
+    """`seeds` of a task, level, robot and scene mode, and the `task` of a name and level, raise
     LookupError if there are none. `members` are the tasks of a category. `world` and `parts` are
     `module:function` paths: the only world whose runs count, and what finds a trial's scene and
     goal. `durations` finds the physics steps of a trial's joint actions; None if
     nothing is known of the world."""
 
     seeds: Callable[[str, int, str, str], Sequence[int]]
-    facts: Callable[[str, int], VariantFacts]
+    task: Callable[[str, int], Task]
     members: Callable[[str], Collection[str]]
     world: str = SAPIEN_NAME
     parts: str = TASK_PARTS
@@ -84,7 +76,7 @@ def shipped(world: str | None = None, parts: str | None = None) -> Reference:
 
     return Reference(
         accepted,
-        facts_of(parts or TASK_PARTS),
+        tasks_of(parts or TASK_PARTS),
         members,
         world or SAPIEN_NAME,
         parts or TASK_PARTS,
@@ -94,19 +86,18 @@ def shipped(world: str | None = None, parts: str | None = None) -> Reference:
     )
 
 
-def facts_of(parts: str) -> Callable[[str, int], VariantFacts]:
-    """A function (task, level) -> facts, from what `parts` (`module:function`) finds."""
+def tasks_of(parts: str) -> Callable[[str, int], Task]:
+    """A function (task, level) -> its task, from what `parts` (`module:function`) finds."""
     find = task_finder(parts)
 
     @cache
-    def facts(name: str, level: int) -> VariantFacts:
+    def task(name: str, level: int) -> Task:
         found = find(TrialKey(name, level, 0))
-        if found.name != name:
-            raise LookupError(f"there is no task {name!r}")
-        about = found.levels[level]
-        return VariantFacts(found.category, about.candidates, about.subtasks, about.steps)
+        if found.name != name or level not in found.levels:
+            raise LookupError(f"there is no task {name!r} of level {level}")
+        return found
 
-    return facts
+    return task
 
 
 SPACES = tuple(dict.fromkeys((*KINDS, "skill")))
@@ -114,8 +105,6 @@ SPACES = tuple(dict.fromkeys((*KINDS, "skill")))
 CONTROLS = ("rest_to_rest",)
 """Ways of executing an action that the benchmark's numbers are made with."""
 ONE = ("embodiment", "mode", "split")
-
-
 VERSIONS = {
     "robospa": r"[0-9]+\.[0-9][^ ]{0,40}",
     "python": r"3\.[1-9][0-9]\.[^ ]{1,20}",
@@ -232,7 +221,7 @@ def check_seeds(keys: Sequence[TrialKey], reference: Reference, practice: bool) 
     for (task, level), found in seeds.items():
         where = f"{task} L{level}"
         try:
-            category = reference.facts(task, level).category
+            category = reference.task(task, level).category
             listed = list(reference.seeds(task, level, robot, mode))
         except LookupError:
             raise BundleError(
@@ -285,22 +274,19 @@ def check_scenes(
     (`module:function`) makes of its key."""
     claims = [(key, r.scene_digest, r.instruction) for key, r in records.items()]
     variants = [list(group) for _, group in groupby(claims, lambda claim: claim[0].variant)]
-    if workers < 2 or len(claims) <= FEW:
-        _judge((first_wrong(parts, found) for found in variants), variants, done)
-        return
-    start = partial(JobProcess, _checker, parts, name="scenes")
-    with Pool[Sequence[Claim], str](start, workers) as pool:
-        futures = [pool.submit(found) for found in variants]
-        _judge((future.result() for future in futures), variants, done)
-
-
-def _judge(wrong: Iterable[str], variants: Sequence[Sequence[Claim]], done: Done) -> None:
-    trials, count = sum(map(len, variants)), 0
-    for text, claims in zip(wrong, variants, strict=True):
-        if text:
-            raise BundleError(text)
-        count += len(claims)
-        done(count, trials)
+    wrong: Iterable[str] = (first_wrong(parts, found) for found in variants)
+    with ExitStack() as stack:
+        if workers > 1 and len(claims) > FEW:
+            start = partial(JobProcess, _checker, parts, name="scenes")
+            pool = stack.enter_context(Pool[Sequence[Claim], str](start, workers))
+            futures = [pool.submit(found) for found in variants]
+            wrong = (future.result() for future in futures)
+        count = 0
+        for text, found in zip(wrong, variants, strict=True):
+            if text:
+                raise BundleError(text)
+            count += len(found)
+            done(count, len(claims))
 
 
 def _checker(parts: str) -> Callable[[Sequence[Claim]], str]:

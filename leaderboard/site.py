@@ -33,7 +33,7 @@ from robospa.leaderboard.submission import left_out, read_submissions
 from robospa.leaderboard.verify import paired, results_of
 from robospa.results.failures.labels import NAMES, SIMULATED_PER_FILM
 from robospa.results.figures.draw import draw
-from robospa.results.figures.series import COLOURS, DrawnFigure, Series
+from robospa.results.figures.series import COLOURS, Series
 from robospa.results.paper.origin import DIFFERENCES, ORIGIN
 from robospa.results.paper.published import load
 from robospa.results.report.page import FIGURES, card, figure, render
@@ -177,15 +177,21 @@ def suites(entries: Sequence[Entry]) -> list[dict[str, object]]:
 def write_model(entry: Entry, folder: Path) -> None:
     """The page of one model, with its figures and films, into `folder`."""
     (folder / FIGURES).mkdir(parents=True, exist_ok=True)
-    films = list(entry.submission.films) if entry.submission else []
-    address = entry.submission.evidence.address if entry.submission else ""
-    if entry.submission:
-        names = [str(film["video"]) for film in films] + [IN_REPOSITORY] * (
-            address == IN_REPOSITORY
-        )
-        for name in names:
-            put(entry.submission.folder / name, folder / name)
-    drawings = _figures(entry, folder / FIGURES)
+    films, address, chosen = list[Mapping[str, object]](), "", dict[str, Grounding]()
+    if kept := entry.submission:
+        films, address, chosen = list(kept.films), kept.evidence.address, {**kept.grounding}
+        names = [str(film["video"]) for film in films]
+        for name in (*names, IN_REPOSITORY) if address == IN_REPOSITORY else names:
+            put(kept.folder / name, folder / name)
+    scores, known = entry.column.scores, load().tasks
+    series = Series(entry.name, scores, failures=entry.failures, grounding=chosen)
+    drawings = draw([series], folder / FIGURES, FORMATS)
+    shown = report_tables([entry.column])
+    if table := table_of([(entry.name, {(row, 0): one for row, one in chosen.items()})]):
+        shown.append(ReportTable(table, False))
+    # those of all tasks are opened by hand
+    shown = [replace(table, folded=table.table.name.endswith("-tasks")) for table in shown]
+    ran = sum(task in known for task in scores.tasks)
     counts = sum(map(Counter, entry.failures.values()), Counter[str]())
     failures = [FailureCount(kind, NAMES[kind], [n]) for kind, n in counts.most_common()]
     sections = ["summary", "evidence", "tables", "figures"]
@@ -195,13 +201,13 @@ def write_model(entry: Entry, folder: Path) -> None:
         "model.html",
         title=entry.name,
         badges=[(badge, BADGES[badge]) for badge in entry.badges],
-        partial=_partial(entry),
-        card=card(entry.name, entry.column.scores),
+        partial=f"ran {ran} of {len(known)} tasks" if ran < len(known) else "",
+        card=card(entry.name, scores),
         about=entry.about,
         evidence=entry.evidence,
         address=address,
         link=entry.link,
-        tables=for_page(_tables(entry)),
+        tables=for_page(shown),
         scores_shown=1,
         note=" ".join(method_notes([entry.column])),
         figures=[figure(drawing, folder, FORMATS) for drawing in drawings],
@@ -224,31 +230,6 @@ def write_model(entry: Entry, folder: Path) -> None:
     replace_file(folder / "index.html", page.encode())
 
 
-def _partial(entry: Entry) -> str:
-    """What a reader has to know of a model that did not run everything; "" if it did."""
-    known = load().tasks
-    count = sum(task in known for task in entry.column.scores.tasks)
-    return f"ran {count} of {len(known)} tasks" if count < len(known) else ""
-
-
-def _tables(entry: Entry) -> list[ReportTable]:
-    """The report's tables; those of all tasks are opened by hand."""
-    shown = report_tables([entry.column])
-    if table := table_of([(entry.name, {(row, 0): one for row, one in _chosen(entry).items()})]):
-        shown.append(ReportTable(table, False))
-    return [replace(table, folded=table.table.name.endswith("-tasks")) for table in shown]
-
-
-def _chosen(entry: Entry) -> Mapping[str, Grounding]:
-    return entry.submission.grounding if entry.submission else {}
-
-
-def _figures(entry: Entry, folder: Path) -> list[DrawnFigure]:
-    chosen, scores = _chosen(entry), entry.column.scores
-    series = Series(entry.name, scores, failures=entry.failures, grounding=chosen)
-    return draw([series], folder, FORMATS)
-
-
 FOLDER = "pairs"
 Pair = tuple[Entry, Entry]
 
@@ -268,15 +249,9 @@ def _variants(entry: Entry) -> set[str]:
     return set(entry.submission.outcomes) if entry.submission else set()
 
 
-def write_pairs(pairs: Sequence[Pair], out: Path, note: Callable[[str], None]) -> None:
-    """Write the script of every pair below `out`, and remove those of others."""
-    wanted = {f"{one.slug}/{two.slug}.js" for one, two in pairs}
-    for old in (out / FOLDER).glob("*/*.js"):
-        if str(old.relative_to(out / FOLDER)) not in wanted:
-            old.unlink()
-    for old in (out / FOLDER).glob("*"):
-        if old.is_dir() and not any(old.iterdir()):
-            shutil.rmtree(old)
+def write_pairs(pairs: Sequence[Pair], out: Path, note: Note) -> None:
+    """Write the script of every pair below `out`, in place of those that were there."""
+    shutil.rmtree(out / FOLDER, ignore_errors=True)
     first: tuple[str, ModelResults] | None = None
     for one, two in pairs:
         path = out / FOLDER / one.slug / f"{two.slug}.js"

@@ -15,7 +15,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, cast
 
 from msgspec import Struct, to_builtins
 
@@ -312,7 +312,12 @@ def read_submission(folder: Path) -> Submission:
     if evidence.address == IN_REPOSITORY:
         check_weights(card, where)
         check_contents(folder, manifest, where)
-    trials, films = _read_trials(parts[TRIALS], folder, where)
+    trials = read(TrialsFile, parts[TRIALS], f"{where}, {TRIALS}", BundleError)
+    for film in trials.films:
+        path = folder / film.video
+        if path.is_symlink() or not path.is_file() or path.stat().st_size > 16 * layout.MEGA:
+            raise BundleError(f"{where}: {film.video} is missing or no plain file")
+    rows = cast(list[dict[str, object]], parts[TRIALS]["films"])
     return Submission(
         folder=folder,
         bundle=manifest.bundle,
@@ -323,7 +328,7 @@ def read_submission(folder: Path) -> Submission:
         outcomes=parts["outcomes.json"],
         evidence=evidence,
         failures=trials.failures,
-        films=films,
+        films=[{**row, "run": 0} for row in rows],
         grounding=trials.grounding,
     )
 
@@ -335,17 +340,3 @@ def _bytes(path: Path, where: str) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise BundleError(f"{where}: {path.name} cannot be read: {error.strerror}") from None
-
-
-def _read_trials(
-    data: Mapping[str, object], folder: Path, where: str
-) -> tuple[TrialsFile, list[dict[str, object]]]:
-    """The file, and rows of filmed trials for the page; BundleError unless the videos are there."""
-    trials = read(TrialsFile, data, f"{where}, {TRIALS}", BundleError)
-    for film in trials.films:
-        path = folder / film.video
-        if path.is_symlink() or not path.is_file() or path.stat().st_size > 16 * layout.MEGA:
-            raise BundleError(f"{where}: {film.video} is missing or no plain file")
-    rows = data["films"]
-    assert isinstance(rows, list)
-    return trials, [{**row, "run": 0} for row in rows]

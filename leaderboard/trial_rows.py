@@ -12,7 +12,7 @@ is a true one is not decided here: replay does that.
 import hashlib
 import json
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from itertools import pairwise
 
 import numpy as np
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from robospa.harness.sim.motion import RATE
 from robospa.harness.trial import policy_seed
 from robospa.leaderboard.bundle import BundleError, check_text, is_sha256, parse_row, sha256
-from robospa.leaderboard.rules import Reference, VariantFacts, spec_of
+from robospa.leaderboard.rules import Reference, spec_of
 from robospa.leaderboard.traces import Trace, split_trace
 from robospa.results.records.manifest import PolicySpecification, RunSettings
 from robospa.results.records.runs import FIELDS, KEY_FIELDS, finished, from_data
@@ -34,19 +34,13 @@ EVENT_FIELDS = frozenset(("time", "kind", "object", "index", "note", "step"))
 LATENCY = {"p50", "p95", "p99", "max"}
 SERVER_LATENCY = {"queue", "infer", "batch"}
 """Entries of the latency that are only there if the policy's server sent them."""
-
-
 MOST_TIMES, MOST_DIAGNOSTICS = 32, 600
 """More entries of `timing`, and values in `diagnostics` with all that they hold, than any trial
 has: what is read stays in memory, where an empty list takes 30 times the place of its text."""
 
 
-@dataclass(frozen=True)
-class TrialRow:
-    """A trial's record and the hash of its stored actions."""
-
-    record: TrialRecord
-    trace: str
+TrialRow = tuple[TrialRecord, str]
+"""A trial's record and the hash of its stored actions."""
 
 
 def trace_hash(trace: NDArray[np.float32]) -> str:
@@ -57,15 +51,18 @@ def trace_hash(trace: NDArray[np.float32]) -> str:
 def write_rows(rows: Iterable[TrialRow], first: str) -> Iterator[bytes]:
     """The chained lines of `rows`, without newlines, starting from the hash `first`."""
     previous = first
-    for row in rows:
-        data = {"previous": previous, "trace": row.trace, "record": asdict(row.record)}
+    for record, trace in rows:
+        data = {"previous": previous, "trace": trace, "record": asdict(record)}
         line = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
         previous = sha256(line)
         yield line
 
 
-def read_rows(lines: Iterable[bytes], first: str, what: str) -> Iterator[tuple[TrialRow, str]]:
-    """Every row with the hash up to it; BundleError at the first that is not what it should be."""
+def read_rows(
+    lines: Iterable[bytes], first: str, what: str
+) -> Iterator[tuple[TrialRecord, str, str]]:
+    """Every record, the hash of its actions and that up to its row; BundleError at the first row
+    that is not what it should be."""
     previous = first
     for number, line in enumerate(lines, 1):
         where = f"{what}, row {number}"
@@ -78,7 +75,7 @@ def read_rows(lines: Iterable[bytes], first: str, what: str) -> Iterator[tuple[T
                 f"{where} does not follow the row before it: rows were changed, moved or left out"
             )
         previous = sha256(line)
-        yield TrialRow(_record(data["record"], where), trace), previous
+        yield _record(data["record"], where), trace, previous
 
 
 def _items(value: object) -> int:
@@ -128,18 +125,19 @@ def check_record(record: TrialRecord, reference: Reference, settings: RunSetting
     slug = record.key.slug
     if not finished(record):
         raise BundleError(f"{slug} is incomplete: the trial was lost and has no result")
-    facts = reference.facts(record.key.task, record.key.level)
+    task = reference.task(*record.key.variant)
+    level = task.levels[record.key.level]
     for name, found, right in (
-        ("category", record.category, facts.category),
-        ("candidates", record.candidates, facts.candidates),
-        ("total", record.total, facts.subtasks),
+        ("category", record.category, task.category),
+        ("candidates", record.candidates, level.candidates),
+        ("total", record.total, level.subtasks),
         ("policy_seed", record.policy_seed, policy_seed(record.key, settings.run_seed)),
     ):
         if found != right:
             raise BundleError(f"{slug}: {name} is {ascii(found)[:40]}, not {right!r}")
     trouble = (
-        _counts(record, facts, spec_of(settings, record.key.task))
-        or _attempts(record, facts)
+        _counts(record, level.steps, spec_of(settings, record.key.task))
+        or _attempts(record, level.steps)
         or _events(record)
         or _end(record)
         or _times(record)
@@ -148,13 +146,13 @@ def check_record(record: TrialRecord, reference: Reference, settings: RunSetting
         raise BundleError(f"{slug} {trouble}")
 
 
-def _counts(record: TrialRecord, facts: VariantFacts, spec: PolicySpecification) -> str:
+def _counts(record: TrialRecord, limit: int, spec: PolicySpecification) -> str:
     """What is impossible about actions, queries and physics steps; "" if nothing is."""
     steps, calls, refused = record.steps, record.policy_calls, record.end == "policy_error"
-    if steps > facts.steps:
-        return f"has {steps} actions; the limit is {facts.steps}"
-    if record.end == "step_limit" and steps < facts.steps:
-        return f"ends at its limit of {facts.steps} actions after {steps}"
+    if steps > limit:
+        return f"has {steps} actions; the limit is {limit}"
+    if record.end == "step_limit" and steps < limit:
+        return f"ends at its limit of {limit} actions after {steps}"
     if not refused and not (steps and calls and record.physics_steps):
         return (
             f"ends in {record.end} with {steps} actions, {calls} queries and "
@@ -173,7 +171,7 @@ def _counts(record: TrialRecord, facts: VariantFacts, spec: PolicySpecification)
     return ""
 
 
-def _attempts(record: TrialRecord, facts: VariantFacts) -> str:
+def _attempts(record: TrialRecord, limit: int) -> str:
     """What is impossible about the attempts; "" if nothing is."""
     if not 1 <= record.attempts <= MOST_ATTEMPTS or repeats(record) > MOST_REPEATS:
         return (
@@ -185,8 +183,8 @@ def _attempts(record: TrialRecord, facts: VariantFacts) -> str:
             f"was tried {record.attempts} times and gives the causes of {len(record.retries)}: "
             "run it with this version"
         )
-    if any((row.steps or 0) > facts.steps for row in record.retries):
-        return f"has an attempt of more than {facts.steps} actions"
+    if any((row.steps or 0) > limit for row in record.retries):
+        return f"has an attempt of more than {limit} actions"
     return ""
 
 

@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import Annotated
@@ -141,7 +142,7 @@ def check_listed(
     rules.check_seeds(keys, reference, practice)
     tasks = list(dict.fromkeys(key.task for key in keys))
     check_checkpoints(card, tasks)
-    if run.categories != {t: reference.facts(t, rules.LEVELS[0]).category for t in tasks}:
+    if run.categories != {t: reference.task(t, rules.LEVELS[0]).category for t in tasks}:
         raise BundleError("the run's categories are not those of its tasks")
     for task in tasks:
         rules.check_card_fits(card, settings, task)
@@ -213,9 +214,8 @@ def _records(
     traces: dict[TrialKey, str] = {}
     digest, last = hashlib.sha256(), manifest.inputs
     lines = archive.rows(layout.RECORDS, digest)
-    for row, so_far in read_rows(lines, manifest.inputs, layout.RECORDS):
-        key, last = row.record.key, so_far
-        place = len(records)
+    for record, trace, so_far in read_rows(lines, manifest.inputs, layout.RECORDS):
+        key, place, last = record.key, len(records), so_far
         if key in records:
             raise BundleError(f"{key.slug[:120]!a} is there twice: one trial has one row")
         if place >= len(keys) or key != keys[place]:
@@ -224,7 +224,7 @@ def _records(
                 f"{keys[place].slug if place < len(keys) else 'the end'}: rows are the listed "
                 "trials by task, level and seed"
             )
-        records[key], traces[key] = row.record, row.trace
+        records[key], traces[key] = record, trace
     if len(records) < len(keys):
         raise BundleError(f"the rows end before {keys[len(records)].slug}: trials are missing")
     if manifest.chain != layout.RowChain(len(records), last):
@@ -251,36 +251,24 @@ def _check_actions(
     """
 
     def check(found: Sequence[TrialRecord]) -> None:
-        space = rules.spec_of(run.manifest.settings, found[0].key.task).space
-        _check_variant(archive, found, traces, reference, space)
+        first = found[0].key
+        name, space = layout.actions_name(*first.variant), spec_of(first.task).space
+        size, most = archive.sizes.get(name, 0), most_bytes([record.steps for record in found])
+        if size > most:
+            raise BundleError(f"{name} unpacks to {size} bytes; its trials have {most} at most")
+        stored = decode(archive.read(name), name)
+        if len(stored) != len(found):
+            raise BundleError(f"{name} holds {len(stored)} trials, not {len(found)}")
+        for record, trace in zip(found, stored, strict=True):
+            digest = trace_hash(trace)
+            if digest != traces[record.key]:
+                raise BundleError(f"{name}: {record.key.slug} has other actions than its row says")
+            check_trace(record, trace, digest, reference, space)
 
-    pool = ThreadPoolExecutor(THREADS)
-    try:
+    spec_of = partial(rules.spec_of, run.manifest.settings)
+    with ThreadPoolExecutor(THREADS) as pool:
         for _ in pool.map(check, _variants(run.records)):
-            pass  # the first that fails, in their order, raises here
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _check_variant(
-    archive: layout.BundleArchive,
-    found: Sequence[TrialRecord],
-    traces: Mapping[TrialKey, str],
-    reference: rules.Reference,
-    space: str,
-) -> None:
-    name = layout.actions_name(*found[0].key.variant)
-    size, most = archive.sizes.get(name, 0), most_bytes([record.steps for record in found])
-    if size > most:
-        raise BundleError(f"{name} unpacks to {size} bytes; its trials have {most} at most")
-    stored = decode(archive.read(name), name)
-    if len(stored) != len(found):
-        raise BundleError(f"{name} holds {len(stored)} trials, not {len(found)}")
-    for record, trace in zip(found, stored, strict=True):
-        digest = trace_hash(trace)
-        if digest != traces[record.key]:
-            raise BundleError(f"{name}: {record.key.slug} has other actions than its row says")
-        check_trace(record, trace, digest, reference, space)
+            pass  # the first that fails, in their order, raises here, and those left are dropped
 
 
 def read_traces(valid: Valid, wanted: Sequence[TrialKey]) -> dict[TrialKey, Trace]:

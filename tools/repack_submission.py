@@ -37,7 +37,8 @@ def rewritten(old: Path, new: Path) -> dict[TrialKey, TrialRow]:
         first = str(archive.read_map(layout.MANIFEST)["inputs"])
         lines = archive.read(layout.RECORDS).splitlines()
         rows: dict[TrialKey, TrialRow] = {
-            row.record.key: row for row, _ in read_rows(lines, first, layout.RECORDS)
+            record.key: (record, trace)
+            for record, trace, _ in read_rows(lines, first, layout.RECORDS)
         }
         stored: dict[TrialKey, Trace] = {}
         for variant in dict.fromkeys(key.variant for key in rows):
@@ -46,7 +47,7 @@ def rewritten(old: Path, new: Path) -> dict[TrialKey, TrialRow]:
             stored.update(zip(keys, decode(archive.read(name), name), strict=True))
         films = {name: archive.read(name) for name in archive.sizes if name.endswith(".mp4")}
         card = to_card(archive.read_map(layout.CARD))
-    whole = Run(old.parent, run, tuple(rows), {key: row.record for key, row in rows.items()})
+    whole = Run(old.parent, run, tuple(rows), {key: record for key, (record, _) in rows.items()})
     write_bundle(new, whole, card, run.suite, stored.__getitem__, films)
     return rows
 
@@ -61,7 +62,7 @@ def repack(folder: Path) -> str:
         rows = rewritten(folder / layout.IN_REPOSITORY, path)
         valid = verify(path, shipped())
         records = valid.run.records
-        same = {key: TrialRow(records[key], valid.traces[key]) for key in records}
+        same = {key: (records[key], valid.traces[key]) for key in records}
         assert same == rows, "a record or an action is another"
         bundle = valid.manifest.bundle
         kept = {name: part for name, part in found.items() if name in ("replayed", "reproduced")}

@@ -22,7 +22,7 @@ from robospa.harness.world import ActionError, Poll, StepResult
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import BundleError, BundleLimits
 from robospa.leaderboard.card import to_card
-from robospa.leaderboard.rules import Reference, facts_of, manifest_of
+from robospa.leaderboard.rules import Reference, manifest_of, tasks_of
 from robospa.leaderboard.verify import verify
 from robospa.results.records.manifest import (
     RunAbout,
@@ -112,7 +112,7 @@ def seeds_of(task: str, level: int, embodiment: str, mode: str) -> Sequence[int]
 
 REFERENCE = Reference(
     seeds_of,
-    facts_of("run_fakes:parts"),
+    tasks_of("run_fakes:parts"),
     lambda category: MEMBERS[category],
     world="bundle_fakes:World",
     parts="run_fakes:parts",

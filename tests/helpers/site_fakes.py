@@ -44,7 +44,7 @@ REPRODUCED: dict[str, Any] = {
 def make_valid(folder: Path, policy: FakePolicy | None = None, **card: Any) -> Valid:
     """A valid bundle in `folder` of what `policy` did, its card changed by `card`."""
     run = make_run(folder / "run", policy=policy)
-    return pack([run], to_card({**CARD_DATA, **card}), folder / "bundle.zip", REFERENCE)[0].valid
+    return pack([run], to_card({**CARD_DATA, **card}), folder / "bundle.zip", REFERENCE)[0]
 
 
 def make_submission(folder: Path, home: Path, *evidence: dict[str, Any], **card: Any) -> Path:

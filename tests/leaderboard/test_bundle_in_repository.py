@@ -40,7 +40,7 @@ def valid(tmp_path_factory: pytest.TempPathFactory) -> Valid:
     """A bundle of a model whose weights a recipe remakes."""
     folder = tmp_path_factory.mktemp("recipe")
     run = make_run(folder / "run")
-    return pack([run], to_card(data()), folder / "packed.zip", REFERENCE)[0].valid
+    return pack([run], to_card(data()), folder / "packed.zip", REFERENCE)[0]
 
 
 @pytest.fixture

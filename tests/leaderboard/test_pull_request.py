@@ -18,14 +18,14 @@ from wire_helpers import serving
 from robospa.leaderboard import pull_request
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.card import read_card
-from robospa.leaderboard.packing import Packing, pack
-from robospa.leaderboard.pull_request import DIFF, Change, check, fetch, read_changes, submitted
+from robospa.leaderboard.packing import pack
+from robospa.leaderboard.pull_request import DIFF, check, fetch, read_changes, submitted
 from robospa.leaderboard.rules import shipped
 from robospa.trial import TrialKey
 
 ROOT = Path(__file__).parents[2]
 MINE = "leaderboard/submissions/mine/"
-TWO = [Change("A", MINE + "model.toml"), Change("A", MINE + "bundle.txt")]
+TWO = [("A", MINE + "model.toml"), ("A", MINE + "bundle.txt")]
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +35,7 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     make_run(folder / "run", [TrialKey(PICK, 1, seed) for seed in SEEDS])
     (folder / "model.toml").write_text(CARD)
     card, reference = read_card(folder / "model.toml"), shipped("bundle_fakes:World", FAKES[-1])
-    pack([folder / "run"], card, folder / "b.zip", reference, Packing(practice=True, videos=False))
+    pack([folder / "run"], card, folder / "b.zip", reference, practice=True, videos=False)
     return folder / "b.zip"
 
 
@@ -77,7 +77,7 @@ HOME = "leaderboard/submissions/"
 )
 def test_other_changes_are_refused(status: str, path: str, words: str) -> None:
     with pytest.raises(BundleError, match=words):
-        submitted([*TWO, Change(status, path)])
+        submitted([*TWO, (status, path)])
 
 
 def git(folder: Path, *words: str) -> bytes:
@@ -103,7 +103,7 @@ def repository(tmp_path: Path) -> Path:
     return folder
 
 
-def changes_of(repository: Path) -> list[Change]:
+def changes_of(repository: Path) -> list[tuple[str, str]]:
     git(repository, "add", ".")
     git(repository, "commit", "-q", "-m", "mine")
     return read_changes(git(repository, *DIFF.split()[1:], "main...HEAD"))
@@ -131,7 +131,7 @@ def test_unusual_names_are_read_as_they_are(repository: Path, name: str) -> None
     folder.mkdir(parents=True)
     (folder / "model.toml").write_text("")
     found = changes_of(repository)
-    assert found == [Change("A", f"leaderboard/submissions/{name}/model.toml")]
+    assert found == [("A", f"leaderboard/submissions/{name}/model.toml")]
     with pytest.raises(BundleError, match="is not leaderboard/submissions/NAME"):
         submitted(found)
 
@@ -237,8 +237,8 @@ def test_the_script_says_what_it_refuses(tmp_path: Path) -> None:
     script = [sys.executable, str(ROOT / "scripts/check_submission.py"), "changed.txt", ".", "out"]
     done = subprocess.run(script, cwd=tmp_path, capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout) == (0, "no submission is handed in\n")
-    changes = [*TWO, Change("M", "harness/trial.py")]
-    text = "".join(f"{change.status}\0{change.path}\0" for change in changes)
+    changes = [*TWO, ("M", "harness/trial.py")]
+    text = "".join(f"{status}\0{path}\0" for status, path in changes)
     (tmp_path / "changed.txt").write_text(text)
     done = subprocess.run(script, cwd=tmp_path, capture_output=True, text=True, timeout=60)
     assert done.returncode == 1

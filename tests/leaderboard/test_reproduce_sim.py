@@ -34,7 +34,7 @@ from robospa.leaderboard.audit import (
     sentence_reaction,
 )
 from robospa.leaderboard.card import to_card
-from robospa.leaderboard.packing import Packing, pack
+from robospa.leaderboard.packing import pack
 from robospa.leaderboard.reproduce import (
     check_policy,
     compare,
@@ -156,10 +156,8 @@ def valid(tmp_path_factory: pytest.TempPathFactory, stolen: Run) -> Valid:
     card["actions"]["chunk"] = HORIZON
     assert sum(r.success for r in stolen.records.values()) == TRIALS
     out = tmp_path_factory.mktemp("bundle") / "b.zip"
-    (made,) = pack(
-        [stolen.folder], to_card(card), out, shipped(), Packing(practice=True, videos=False)
-    )
-    return made.valid
+    (made,) = pack([stolen.folder], to_card(card), out, shipped(), practice=True, videos=False)
+    return made
 
 
 def test_a_claim_is_reproduced_and_a_cheat_is_caught(tmp_path: Path, valid: Valid) -> None:

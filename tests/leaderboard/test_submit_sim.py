@@ -8,7 +8,7 @@ import pytest
 from bundle_fakes import CARD_DATA
 
 from robospa.leaderboard.card import to_card
-from robospa.leaderboard.packing import Packing, pack
+from robospa.leaderboard.packing import pack
 from robospa.leaderboard.replay import replay
 from robospa.leaderboard.rules import shipped
 from robospa.leaderboard.verify import verify
@@ -32,7 +32,7 @@ def test_a_real_run_replays_to_the_bit(tmp_path: Path) -> None:
     card["actions"]["chunk"] = spec["settings"]["policy"]["spec"]["horizon"]
     card["actions"]["space"] = spec["settings"]["policy"]["spec"]["action"]
     reference = shipped()
-    pack([tmp_path / "run"], to_card(card), tmp_path / "b.zip", reference, Packing(practice=True))
+    pack([tmp_path / "run"], to_card(card), tmp_path / "b.zip", reference, practice=True)
     valid = verify(tmp_path / "b.zip", reference, practice=True)
     assert [name for name in valid.manifest.files if name.startswith("videos/")]
     made = replay(valid, "a value nobody knew", 2, reference, workers=2)
