@@ -16,7 +16,7 @@ import hashlib
 import secrets
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Protocol, cast
 
 import numpy as np
@@ -160,7 +160,11 @@ class TrialState:
     def poll(self, snapshot: Snapshot) -> bool:
         """Update the goal; True once it is met or lost."""
         started = time.perf_counter()
-        new = self._update_goal(snapshot)
+        new = self.parts.tracker.update(snapshot)
+        if self.clutter is not None:
+            new = (*self.clutter.update(snapshot), *new)
+        if self.grasps is not None:
+            new = (*self.grasps.update(snapshot), *new)
         self.stopwatch.add("goal", started)
         if self.recorder is not None:
             self.stopwatch.call("recording", self.recorder.polled, self.world, snapshot.time)
@@ -169,16 +173,6 @@ class TrialState:
         self.note(new)
         return any(event.kind in ("success", "failed") for event in new)
 
-    def _update_goal(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """New events of the goal, of the grippers and of the clutter."""
-        new = self.parts.tracker.update(snapshot)
-        if self.clutter is not None:
-            new = (*self.clutter.update(snapshot), *new)
-        if self.grasps is not None:
-            attempts = self.grasps.update(snapshot)
-            return (*attempts, *new) if attempts else new
-        return new
-
     def note(self, new: tuple[Event, ...]) -> None:
         """Keep events, with the action during which they happened."""
         self.events.extend(new)
@@ -186,17 +180,8 @@ class TrialState:
 
     def rows(self, first: int = 0) -> tuple[EventRow, ...]:
         """The events from number `first` on as a record keeps them."""
-        return tuple(
-            EventRow(
-                time=event.time,
-                kind=event.kind,
-                object=event.object,
-                index=event.index,
-                note=event.note,
-                step=step,
-            )
-            for event, step in zip(self.events[first:], self.event_steps[first:], strict=True)
-        )
+        rows = zip(self.events[first:], self.event_steps[first:], strict=True)
+        return tuple(cast(EventRow, {**asdict(event), "step": step}) for event, step in rows)
 
     def observation(self, spec: PolicySpec) -> Observation:
         """The observation of this instant that `spec` asks for."""

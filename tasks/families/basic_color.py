@@ -4,8 +4,9 @@ Same objects, numbers and layouts as there; every object of a scene has a colour
 the colour alone names the target.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -45,32 +46,31 @@ def alike(asset: str) -> Colored:
     return draw
 
 
-@dataclass(frozen=True)
-class Palette:
-    """What colours the categories of a mixed set have.
+BROWN_BREAD = 5
+"""The look of bread with the darkest crust."""
+
+
+def mixed(
+    kinds: Sequence[str],
+    natural: Mapping[str, tuple[str, ...]] = MappingProxyType({}),
+    never: Sequence[str] = (),
+) -> Colored:
+    """One object each of the level's first `kinds`, in different colours.
 
     `natural` are the colours of things that exist in few colours, the most restricted first;
     `never` are colours that a detail of another object of the set would show as well.
     """
 
-    assets: tuple[str, ...]
-    natural: tuple[tuple[str, tuple[str, ...]], ...] = ()
-    never: tuple[str, ...] = ()
-
-
-def mixed(palette: Palette) -> Colored:
-    """One object each of the level's first categories, in different colours."""
-
     def draw(level: int, rng: np.random.Generator) -> tuple[list[distance.Thing], list[str]]:
-        assets = [palette.assets[int(i)] for i in rng.permutation(distance.COUNTS[level - 1])]
+        assets = [kinds[int(i)] for i in rng.permutation(distance.COUNTS[level - 1])]
         shuffled = [COLORS[int(i)] for i in rng.permutation(len(COLORS))]
-        free = [word for word in shuffled if word not in palette.never]
+        free = [word for word in shuffled if word not in never]
         chosen: dict[str, str] = {}
-        for asset, some in palette.natural:
+        for asset, some in natural.items():
             if asset in assets:
                 chosen[asset] = next(word for word in free if word in some)
                 free.remove(chosen[asset])
-        kept = {word for _, some in palette.natural if len(some) == 1 for word in some}
+        kept = {word for some in natural.values() if len(some) == 1 for word in some}
         rest = iter(word for word in free if word not in kept)
         words = [chosen.get(asset) or next(rest) for asset in assets]
         things: list[distance.Thing] = [
@@ -80,13 +80,6 @@ def mixed(palette: Palette) -> Colored:
         return things, words
 
     return draw
-
-
-BROWN_BREAD = 5
-"""The look of bread with the darkest crust."""
-SET_A = Palette(distance.ASSETS_A, (("bread", ("brown",)), ("apple", ("red", "green", "yellow"))))
-SET_B = Palette(distance.ASSETS_B, never=("yellow",))
-"""Fries are yellow in any carton."""
 
 
 @dataclass(frozen=True)
@@ -130,10 +123,11 @@ def color_task(family: distance.ObjectSet, colored: Colored) -> Task:
     )
 
 
+NATURAL_A = {"bread": ("brown",), "apple": ("red", "green", "yellow")}
 TASKS = (
     color_task(distance.BLOCKS, blocks),
     color_task(distance.MUGS, alike("mug")),
     color_task(distance.PILL_BOTTLES, alike("pill_bottle")),
-    color_task(distance.MIXED_A, mixed(SET_A)),
-    color_task(distance.MIXED_B, mixed(SET_B)),
+    color_task(distance.MIXED_A, mixed(distance.ASSETS_A, NATURAL_A)),
+    color_task(distance.MIXED_B, mixed(distance.ASSETS_B, never=("yellow",))),  # fries, any carton
 )

@@ -17,7 +17,7 @@ from robospa.geometry import Array, Pose, Vec3, yaw_rotation
 from robospa.tasks.families.table import PickFacts, drawn_color, lifted, pick_target
 from robospa.tasks.goals.lifting import Lift
 from robospa.tasks.instructions import Slots, TaskText, ordinal
-from robospa.tasks.sampling.places import Area, Mask, Points, Range, scatter, spread
+from robospa.tasks.sampling.places import Area, Mask, Points, Range, scatter, wide
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import TABLE_TOP, FixedCamera, Workcell
@@ -56,11 +56,6 @@ def tight_row(points: Points) -> bool:
     """Three blocks in one tight row, left to right: too hard to get between."""
     pairs = list(itertools.pairwise(sorted(points)))
     return all(b[0] - a[0] < 0.13 and abs(b[1] - a[1]) < 0.035 for a, b in pairs)
-
-
-def wide(x: float, y: float) -> Callable[[Points], bool]:
-    """Whether points extend over at least `x` and `y` [m]."""
-    return lambda ps: spread([p[0] for p in ps]) >= x and spread([p[1] for p in ps]) >= y
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from robospa.tasks.sampling.places import NoRoom, retry
 from robospa.tasks.sampling.turns import Turnable, between
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Params
-from robospa.tasks.task import Draw, Level, SceneSample, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "canonical_index.toml")
@@ -48,18 +48,13 @@ def different(assets: Sequence[str]) -> Things:
 
     def things(rng: np.random.Generator, count: int) -> Sequence[Thing]:
         drawn = [assets[int(a)] for a in rng.permutation(count)]
-        return [(asset, _variant(rng, asset)) for asset in drawn]
+        return [(asset, table.draw_variant(rng, asset, VARIANTS.get(asset))) for asset in drawn]
 
     return things
 
 
 VARIANTS: Mapping[str, tuple[int, ...]] = {"alarm_clock": (2,), "phone_stand": (1, 2, 3, 4, 5)}
 """Variants that are used, where not all: official ones, no clock too wide to be taken from afar."""
-
-
-def _variant(rng: np.random.Generator, asset: str) -> dict[str, int]:
-    some = VARIANTS.get(asset)
-    return {"look": int(rng.choice(some))} if some else table.draw_variant(rng, asset)
 
 
 @dataclass(frozen=True)
@@ -99,50 +94,48 @@ class Facts(table.PickFacts):
     row_direction: str = ""
 
 
-def drawer(line: Line, fixed: bool) -> Draw:
-    """The draw of `line`: the grid, what stands where, and a uniform cell to count to.
+def draw(
+    level: int, rng: np.random.Generator, workcell: Workcell, line: Line, fixed: bool
+) -> SceneSample:
+    """The grid, what stands where, and a uniform cell to count to.
 
     Directions are uniform too, or, if `fixed`, left to right and far to near.
     """
+    grid = line.layouts[level]
+    count = grid.rows * grid.columns
+    things = line.things(rng, count)
 
-    def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
-        grid = line.layouts[level]
-        count = grid.rows * grid.columns
-        things = line.things(rng, count)
-
-        def lying() -> tuple[list[int], list[tuple[Turnable, float]]]:
-            place = grid.places(rng, workcell)
-            cells = [int(c) for c in rng.permutation(count)]
-            items = [
-                (
-                    Turnable(asset, params, place(k, cells[k])),
-                    line.turn(asset, cells[k] % grid.columns >= grid.columns / 2),
-                )
-                for k, (asset, params) in enumerate(things)
-            ]
-            if any(between(a, b) < 0.0 for a, b in combinations(items, 2)):
-                raise NoRoom("two things would touch")
-            return cells, items
-
-        cells, items = retry(lying, f"grid of {count} {line.noun}s")
-        row, column = int(rng.integers(grid.rows)), int(rng.integers(grid.columns))
-        from_right, from_far = False, True
-        if not fixed:
-            from_right, from_far = bool(rng.integers(2)), bool(rng.integers(2))
-        facts = Facts(
-            target=f"object_{cells.index(row * grid.columns + column)}",
-            column=grid.columns - column if from_right else column + 1,
-            column_direction="right_to_left" if from_right else "left_to_right",
-        )
-        if grid.rows > 1:
-            facts = replace(
-                facts,
-                row=grid.rows - row if from_far else row + 1,
-                row_direction="far_to_near" if from_far else "near_to_far",
+    def lying() -> tuple[list[int], list[tuple[Turnable, float]]]:
+        place = grid.places(rng, workcell)
+        cells = [int(c) for c in rng.permutation(count)]
+        items = [
+            (
+                Turnable(asset, params, place(k, cells[k])),
+                line.turn(asset, cells[k] % grid.columns >= grid.columns / 2),
             )
-        return SceneSample(table.put_down(*zip(*items, strict=True)), facts)
+            for k, (asset, params) in enumerate(things)
+        ]
+        if any(between(a, b) < 0.0 for a, b in combinations(items, 2)):
+            raise NoRoom("two things would touch")
+        return cells, items
 
-    return draw
+    cells, items = retry(lying, f"grid of {count} {line.noun}s")
+    row, column = int(rng.integers(grid.rows)), int(rng.integers(grid.columns))
+    from_right, from_far = False, True
+    if not fixed:
+        from_right, from_far = bool(rng.integers(2)), bool(rng.integers(2))
+    facts = Facts(
+        target=f"object_{cells.index(row * grid.columns + column)}",
+        column=grid.columns - column if from_right else column + 1,
+        column_direction="right_to_left" if from_right else "left_to_right",
+    )
+    if grid.rows > 1:
+        facts = replace(
+            facts,
+            row=grid.rows - row if from_far else row + 1,
+            row_direction="far_to_near" if from_far else "near_to_far",
+        )
+    return SceneSample(table.put_down(*zip(*items, strict=True)), facts)
 
 
 def line_task(line: Line, basic: bool = False) -> Task:
@@ -173,7 +166,7 @@ def line_task(line: Line, basic: bool = False) -> Task:
         name=f"Basic_Ordinal_{line.kind}" if basic else table.pick_name(line.kind, "Canonical"),
         category="SOI" if basic else "CPI",
         levels={k: Level(g.rows * g.columns, 1, 150) for k, g in line.layouts.items()},
-        draw=drawer(line, basic),
+        draw=lambda level, rng, workcell: draw(level, rng, workcell, line, basic),
         goal=table.lifted(Lift(rise=0.04, steady=line.steady)),
         plan=table.pick_target,
         templates=lambda level: TEXT.templates(level, wording),

@@ -22,7 +22,7 @@ from robospa.tasks.instructions import Slots, TaskText
 from robospa.tasks.sampling.places import Fits, LayoutError, Mask, pool, walk
 from robospa.tasks.sampling.turns import Turnable, turned
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draw, Level, SceneSample, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import TABLE_TOP, Workcell
 
 MEANINGS = {"front": "farthest from", "back": "nearest to"}
@@ -127,7 +127,9 @@ class ObjectSpread:
             dx**2 + dy**2 >= self.spacing[2] ** 2
         )
         if self.alike:
-            free &= self._separate(workcell, points, moved_to)
+            left, right, top, bottom = self._box(workcell, points[..., 0], points[..., 1])
+            wl, wr, wt, wb = self._box(workcell, moved_to[:, :1], moved_to[:, 1:])
+            free &= (left >= wr) | (wl >= right) | (top >= wb) | (wt >= bottom)
         else:
             middle = TABLE_TOP + self.tall / 2
             u, v = workcell.head.pixel(points[..., 0], points[..., 1], middle)
@@ -135,12 +137,6 @@ class ObjectSpread:
             free &= (u - wu) ** 2 + (v - wv) ** 2 >= PIXELS**2
         free[:, i] = True
         return np.asarray(free.all(axis=1))
-
-    def _separate(self, workcell: Workcell, points: Array, moved_to: Array) -> Mask:
-        """Whether the bounding boxes in the head image do not overlap."""
-        left, right, top, bottom = self._box(workcell, points[..., 0], points[..., 1])
-        wl, wr, wt, wb = self._box(workcell, moved_to[:, :1], moved_to[:, 1:])
-        return np.asarray((left >= wr) | (wl >= right) | (top >= wb) | (wt >= bottom))
 
     def _box(self, workcell: Workcell, x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
         """Left, right, top and bottom [px] of the upright cylinders that bound the objects."""
@@ -219,43 +215,44 @@ class Facts(table.PickFacts):
     position: str
 
 
-def drawer(spread: ObjectSpread, views: tuple[str, ...]) -> Draw:
-    """The draw of `spread`: a uniform viewpoint of `views`, a layout, what lies where, and one of
-    the objects that are extreme there, each equally likely: the scene does not tell which.
-    """
+def draw(
+    level: int,
+    rng: np.random.Generator,
+    workcell: Workcell,
+    spread: ObjectSpread,
+    views: tuple[str, ...],
+) -> SceneSample:
+    """A uniform viewpoint of `views`, a layout, what lies where, and one of the objects that are
+    extreme there, each equally likely: the scene does not tell which."""
+    count = OBJECTS[level]
+    view = views[int(rng.integers(len(views)))]
+    known = layouts(workcell, spread, level)
+    if spread.alike:
+        things = [(spread.assets[0], table.draw_params(rng, spread.assets[0]))] * count
+    else:
+        kinds = [spread.assets[int(i)] for i in rng.permutation(len(spread.assets))[:count]]
+        things = [(kind, table.draw_params(rng, kind)) for kind in kinds]
 
-    def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
-        count = OBJECTS[level]
-        view = views[int(rng.integers(len(views)))]
-        known = layouts(workcell, spread, level)
-        if spread.alike:
-            things = [(spread.assets[0], table.draw_params(rng, spread.assets[0]))] * count
-        else:
-            kinds = [spread.assets[int(i)] for i in rng.permutation(len(spread.assets))[:count]]
-            things = [(kind, table.draw_params(rng, kind)) for kind in kinds]
+    def lying() -> tuple[tuple[Array, list[int]], list[Turnable]]:
+        points = known[int(rng.integers(len(known)))][None].copy()
+        walk(rng, points, fits(workcell, spread, level, leaders(points)[0]), SHIFT)
+        order = [int(i) for i in rng.permutation(count)]
+        return (points[0], order), [
+            Turnable(asset, params, (x, y), 0.75 if asset == "block" else math.pi)
+            for (asset, params), (x, y) in zip(things, points[0][order].tolist(), strict=True)
+        ]
 
-        def lying() -> tuple[tuple[Array, list[int]], list[Turnable]]:
-            points = known[int(rng.integers(len(known)))][None].copy()
-            walk(rng, points, fits(workcell, spread, level, leaders(points)[0]), SHIFT)
-            order = [int(i) for i in rng.permutation(count)]
-            return (points[0], order), [
-                Turnable(asset, params, (x, y), 0.75 if asset == "block" else math.pi)
-                for (asset, params), (x, y) in zip(things, points[0][order].tolist(), strict=True)
-            ]
-
-        (points, order), items, yaws = turned(rng, workcell, lying, MARGIN, LAYOUTS)
-        roles = leaders(points[None])[0]
-        asked = int(rng.choice(np.unique(roles)))
-        extreme = int(rng.choice(np.flatnonzero(roles[0] == asked)))
-        facts = Facts(
-            target=f"object_{order.index(asked)}",
-            extreme=EXTREMES[extreme],
-            viewpoint=view,
-            position=SEEN_AS[view][extreme],
-        )
-        return SceneSample(table.put_down(items, yaws), facts)
-
-    return draw
+    (points, order), items, yaws = turned(rng, workcell, lying, MARGIN, LAYOUTS)
+    roles = leaders(points[None])[0]
+    asked = int(rng.choice(np.unique(roles)))
+    extreme = int(rng.choice(np.flatnonzero(roles[0] == asked)))
+    facts = Facts(
+        target=f"object_{order.index(asked)}",
+        extreme=EXTREMES[extreme],
+        viewpoint=view,
+        position=SEEN_AS[view][extreme],
+    )
+    return SceneSample(table.put_down(items, yaws), facts)
 
 
 def slots(scene: Scene) -> Slots:
@@ -279,12 +276,12 @@ def lead(scene: Scene) -> float:
 def spread_task(spread: ObjectSpread, basic: bool = False) -> Task:
     """The CVR task of `spread` or, if `basic`, the EPG one, where the robot is the viewer."""
     kind = spread.kind
-    seen = "the robot" if basic else "a named side"
+    seen, views = ("the robot", VIEWS[:1]) if basic else ("a named side", VIEWS)
     return Task(
         name=f"Basic_Position_{kind}" if basic else table.pick_name(kind, "Multi_View"),
         category="EPG" if basic else "CVR",
         levels={k: Level(min(n, 4), 1, 150) for k, n in OBJECTS.items()},
-        draw=drawer(spread, VIEWS[:1] if basic else VIEWS),
+        draw=lambda level, rng, workcell: draw(level, rng, workcell, spread, views),
         goal=table.lifted(Lift(rise=0.06, closed=True, touching=True)),
         plan=table.pick_target,
         templates=TEXT.templates,

@@ -5,8 +5,6 @@ block lies farther right than the one before it, hardly nearer or farther away, 
 both grippers are open, too. Level 1 has one block, to be brought to the middle of its near half.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -151,93 +149,83 @@ def _falling(count: int, ends: tuple[str, str], measure: str) -> Phrasings:
     return TEXT.phrasings("order.falling", most=most, least=least, measure=measure)
 
 
-def _color_order(colors: list[str]) -> Phrasings:
-    return TEXT.phrasings(
-        "order.colors",
-        colors=listed(colors),
-        first=colors[0],
-        rest=listed(colors[1:]),
-    )
-
-
-def _slots(ranking: Ranking, count: int) -> Slots:
-    if count == 1:
-        return TEXT.slots(ranking.single) | {"middle": COMMON.phrasings("middle.near")}
-    blocks = TEXT.slots(f"blocks.{by_count(count)}", count=count, word=NUMBERS[count])
-    return blocks | {"order": ranking.phrases(count)}
-
-
-@dataclass(frozen=True)
-class Ranking:
-    """What distinguishes the three tasks: looks, phrasings and order of the blocks.
+def _task(
+    name: str,
+    looks: Callable[[int, np.random.Generator], list[Block]],
+    single: str,
+    phrases: Callable[[int], Phrasings],
+    summary: str,
+    next_one: str,
+    released: bool = False,
+) -> Task:
+    """The task to line up blocks of these `looks`.
 
     `single` is the entry of the phrasings for the only block of level 1, `phrases(count)` are those
     of the order of several. `released`: both grippers have to be open (official).
     """
 
-    name: str
-    looks: Callable[[int, np.random.Generator], list[Block]]
-    single: str
-    phrases: Callable[[int], Phrasings]
-    summary: str
-    order: str
-    released: bool = False
+    def goal(scene: Scene) -> Tracker:
+        order = Facts.of(scene).order
+        return (
+            bring_alone(order[0], NEAR_BAND, released) if scene.level == 1 else row(order, released)
+        )
 
+    def slots(scene: Scene) -> Slots:
+        count = len(Facts.of(scene).order)
+        if count == 1:
+            return TEXT.slots(single) | {"middle": COMMON.phrasings("middle.near")}
+        blocks = TEXT.slots(f"blocks.{by_count(count)}", count=count, word=NUMBERS[count])
+        return blocks | {"order": phrases(count)}
 
-RANKINGS = (
-    Ranking(
-        "Height",
-        _heights,
-        "block.plain",
-        lambda count: _falling(count, ("tall", "short"), "height"),
-        "Line the blocks up from left to right, from the tallest to the shortest.",
-        "the next shorter",
-    ),
-    Ranking(
-        "Color",
-        _colors,
-        "block.red",
-        lambda count: _color_order(list(table.ORDERED)[:count]),
-        "Line the blocks up from left to right: red, green, blue, yellow, purple.",
-        "the next colour's",
-    ),
-    Ranking(
-        "Size",
-        _sizes,
-        "block.plain",
-        lambda count: _falling(count, ("large", "small"), "size"),
-        "Line the blocks up from left to right, from the largest to the smallest.",
-        "the next smaller",
-        released=True,
-    ),
-)
-
-
-def _goal(ranking: Ranking, scene: Scene) -> Tracker:
-    order = Facts.of(scene).order
-    if scene.level == 1:
-        return bring_alone(order[0], NEAR_BAND, ranking.released)
-    return row(order, ranking.released)
-
-
-def _task(ranking: Ranking) -> Task:
-    open_too = ", both grippers open" if ranking.released else ""
+    open_too = ", both grippers open" if released else ""
     return Task(
-        name=f"Rank_Blocks_{ranking.name}",
+        name=f"Rank_Blocks_{name}",
         category="OFE",
         levels=table.LEVELS,
-        draw=lambda level, rng, workcell: _draw(ranking.looks(level, rng), rng, workcell),
-        goal=lambda scene: _goal(ranking, scene),
+        draw=lambda level, rng, workcell: _draw(looks(level, rng), rng, workcell),
+        goal=goal,
         plan=plan,
         templates=TEXT.templates,
-        slots=lambda scene: _slots(ranking, len(Facts.of(scene).order)),
-        summary=ranking.summary,
+        slots=slots,
+        summary=f"Line the blocks up from left to right{summary}.",
         success=(
-            f"From left to right every block is followed by {ranking.order} block, at most 3 cm "
-            f"nearer or farther, and all lie on the table, let go of{open_too}. Level 1: the block "
-            "lies near the robot in the middle."
+            f"From left to right every block is followed by the next {next_one} block, at most 3 "
+            f"cm nearer or farther, and all lie on the table, let go of{open_too}. Level 1: the "
+            "block lies near the robot in the middle."
         ),
     )
 
 
-TASKS = tuple(_task(ranking) for ranking in RANKINGS)
+def _color_order(count: int) -> Phrasings:
+    colors = list(table.ORDERED)[:count]
+    words = {"colors": listed(colors), "first": colors[0], "rest": listed(colors[1:])}
+    return TEXT.phrasings("order.colors", **words)
+
+
+TASKS = (
+    _task(
+        "Height",
+        _heights,
+        "block.plain",
+        lambda count: _falling(count, ("tall", "short"), "height"),
+        ", from the tallest to the shortest",
+        "shorter",
+    ),
+    _task(
+        "Color",
+        _colors,
+        "block.red",
+        _color_order,
+        ": red, green, blue, yellow, purple",
+        "colour's",
+    ),
+    _task(
+        "Size",
+        _sizes,
+        "block.plain",
+        lambda count: _falling(count, ("large", "small"), "size"),
+        ", from the largest to the smallest",
+        "smaller",
+        released=True,
+    ),
+)

@@ -20,7 +20,7 @@ from robospa.tasks.instructions import Slots, TaskText
 from robospa.tasks.sampling.grid import StraightLines
 from robospa.tasks.sampling.turns import Turnable, turned
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draw, Level, SceneSample, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "relational.toml")
@@ -125,14 +125,6 @@ def weights(level: int) -> Array:
     return chances
 
 
-def least_distances(crowd: Crowd, families: Sequence[SpacedKind], scale: float) -> Array:
-    """How far apart [m] the centres of each two objects have to be, (count, count); 0 on i = j."""
-    spacing = np.array([f.spacing[2] for f in families]) * (scale if crowd.alike else 1.0)
-    least: Array = np.maximum(spacing[:, None], spacing)
-    np.fill_diagonal(least, 0.0)
-    return least
-
-
 def _places(
     workcell: Workcell,
     crowd: Crowd,
@@ -145,7 +137,9 @@ def _places(
     pitch = crowd.pitches[shape.columns + shape.rows - 4]
     gap_x, gap_y = (round(shape.scale * max(f.spacing[k] for f in families), 4) for k in (0, 1))
     lines = StraightLines(pitch, shape.jitter, (gap_x, gap_y), shape.x, shape.y)
-    least = least_distances(crowd, families, shape.scale)
+    spacing = np.array([f.spacing[2] for f in families]) * (shape.scale if crowd.alike else 1.0)
+    least = np.maximum(spacing[:, None], spacing)  # of each two centres
+    np.fill_diagonal(least, 0.0)
     return lines.places(
         rng,
         used,
@@ -185,67 +179,63 @@ def label_in(scene: Scene, name: str) -> str:
     return _label(SHAPES[scene.level], cells[name], list(cells.values()))
 
 
-def drawer(crowd: Crowd) -> Draw:
-    """The draw of `crowd`: direction and target slot, other slots, a straight layout, turns."""
+def draw(level: int, rng: np.random.Generator, workcell: Workcell, crowd: Crowd) -> SceneSample:
+    """Direction and target slot, other slots, a straight layout, turns."""
+    shape = SHAPES[level]
+    cells, chances = shape.cells, weights(level).ravel()
+    pick = min(int(np.searchsorted(np.cumsum(chances), rng.random())), len(chances) - 1)
+    direction = list(DIRECTIONS)[pick // len(cells)]
+    target = cells[pick % len(cells)]
+    dx, dy = DIRECTIONS[direction]
+    reference = (target[0] - dx, target[1] - dy)
+    rest = [s for s in cells if s not in (target, reference)]
+    others = [rest[int(i)] for i in rng.permutation(len(rest))]
+    # Three in a corner shape: a diagonal never asks for the corner, so the other directions
+    # have to, in two of three scenes; else a guesser would leave the corner out.
+    corner = shape.count == 3 and all(a != b for a, b in zip(target, others[0], strict=True))
+    if corner and rng.random() < 1 / 3:
+        others.reverse()
+    used = [target, reference, *others][: shape.count]
+    used = [used[int(i)] for i in rng.permutation(len(used))]
+    families = crowd.families * len(used)
+    if not crowd.alike:
+        order = rng.permutation(len(crowd.families))[: len(used)]
+        families = tuple(crowd.families[int(i)] for i in order)
+    families = families[: len(used)]
+    params = [table.draw_params(rng, f.asset) for f in families[: 1 if crowd.alike else None]]
+    params = params * (len(families) if crowd.alike else 1)
 
-    def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
-        shape = SHAPES[level]
-        cells, chances = shape.cells, weights(level).ravel()
-        pick = min(int(np.searchsorted(np.cumsum(chances), rng.random())), len(chances) - 1)
-        direction = list(DIRECTIONS)[pick // len(cells)]
-        target = cells[pick % len(cells)]
-        dx, dy = DIRECTIONS[direction]
-        reference = (target[0] - dx, target[1] - dy)
-        rest = [s for s in cells if s not in (target, reference)]
-        others = [rest[int(i)] for i in rng.permutation(len(rest))]
-        # Three in a corner shape: a diagonal never asks for the corner, so the other directions
-        # have to, in two of three scenes; else a guesser would leave the corner out.
-        corner = shape.count == 3 and all(a != b for a, b in zip(target, others[0], strict=True))
-        if corner and rng.random() < 1 / 3:
-            others.reverse()
-        used = [target, reference, *others][: shape.count]
-        used = [used[int(i)] for i in rng.permutation(len(used))]
-        families = crowd.families * len(used)
-        if not crowd.alike:
-            order = rng.permutation(len(crowd.families))[: len(used)]
-            families = tuple(crowd.families[int(i)] for i in order)
-        families = families[: len(used)]
-        params = [table.draw_params(rng, f.asset) for f in families[: 1 if crowd.alike else None]]
-        params = params * (len(families) if crowd.alike else 1)
+    def lying() -> tuple[None, list[Turnable]]:
+        points = _places(workcell, crowd, shape, families, used, rng).tolist()
+        return None, [
+            Turnable(family.asset, own, (x, y), family.half_range)
+            for family, own, (x, y) in zip(families, params, points, strict=True)
+        ]
 
-        def lying() -> tuple[None, list[Turnable]]:
-            points = _places(workcell, crowd, shape, families, used, rng).tolist()
-            return None, [
-                Turnable(family.asset, own, (x, y), family.half_range)
-                for family, own, (x, y) in zip(families, params, points, strict=True)
-            ]
-
-        _, items, yaws = turned(rng, workcell, lying, EDGE, LAYOUTS)
-        facts = Facts(
-            target=f"object_{used.index(target)}",
-            reference=f"object_{used.index(reference)}",
-            relation=direction,
-            reference_label=_label(shape, reference, used),
-        )
-        return SceneSample(table.put_down(items, yaws), facts)
-
-    return draw
+    _, items, yaws = turned(rng, workcell, lying, EDGE, LAYOUTS)
+    facts = Facts(
+        target=f"object_{used.index(target)}",
+        reference=f"object_{used.index(reference)}",
+        relation=direction,
+        reference_label=_label(shape, reference, used),
+    )
+    return SceneSample(table.put_down(items, yaws), facts)
 
 
-def _slots(direction: str, reference: str, level: int, noun: str) -> Slots:
-    """Phrasings for the neighbour in `direction` of the object at the place called `reference`.
+def _slots(scene: Scene, noun: str) -> Slots:
+    """Phrasings for the target's direction and for the place of the reference.
 
     From level 2 on an axis neighbour is "directly" there (official wording); from level 4 on a
     diagonal neighbour is "immediately" there, because another object may lie further out on the
     same side.
     """
-    side = direction.replace("_", "-")
+    facts = Facts.of(scene)
+    side, label = (text.replace("_", "-") for text in (facts.relation, facts.reference_label))
     how = ""
     if "-" in side:
-        how = "immediately " if level >= 4 else ""
-    elif level >= 2:
+        how = "immediately " if scene.level >= 4 else ""
+    elif scene.level >= 2:
         how = "directly "
-    label = reference.replace("_", "-")
     where = label.replace("-", " ")
     at = {"left": "on the left", "right": "on the right", "center": "in the center"}.get(
         where, f"at the {where}"
@@ -259,20 +249,15 @@ def _slots(direction: str, reference: str, level: int, noun: str) -> Slots:
 
 def crowd_task(crowd: Crowd) -> Task:
     """The RRR task of `crowd`."""
-
-    def slots(scene: Scene) -> Slots:
-        facts = Facts.of(scene)
-        return _slots(facts.relation, facts.reference_label, scene.level, crowd.noun)
-
     return Task(
         name=table.pick_name(crowd.kind, "Relational"),
         category="RRR",
         levels={k: Level(s.count, 1, 150) for k, s in SHAPES.items()},
-        draw=drawer(crowd),
+        draw=lambda level, rng, workcell: draw(level, rng, workcell, crowd),
         goal=table.lifted(Lift(rise=0.06, closed=True)),
         plan=table.pick_target,
         templates=lambda level: TEXT.templates(level, crowd.wording),
-        slots=slots,
+        slots=lambda scene: _slots(scene, crowd.noun),
         summary=f"Pick the one next to a named one among 2 to 9 {crowd.what}, in one of eight "
         "directions.",
         success="the target rose by more than 6 cm, carried by a closed gripper",

@@ -56,20 +56,10 @@ def _sample(
     points: Sequence[places.Point],
     colors: tuple[str, ...] = (),
 ) -> SceneSample:
-    place = _building_place(level, rng, points)
-    return table.sample(rng, items, TowerFacts, place=place, colors=colors)
-
-
-def _building_place(
-    level: int, rng: np.random.Generator, blocks: Sequence[places.Point]
-) -> places.Point:
-    """Where the expert builds; not part of the task's rule."""
+    """The place where the expert builds is not part of the task's rule."""
     x, y = ((-0.01, 0.01), (-0.20, -0.10)) if level == 1 else ((-0.03, 0.03), (-0.15, -0.11))
-    for _ in range(100):
-        point = (rng.uniform(*x), rng.uniform(*y))
-        if places.apart(point, blocks, CLEARANCE):
-            return point
-    return (0.0, -0.16)
+    place = places.tried_point(rng, x, y, [(p, CLEARANCE) for p in points], 100) or (0.0, -0.16)
+    return table.sample(rng, items, TowerFacts, place=place, colors=colors)
 
 
 def goal(scene: Scene) -> Checklist:
@@ -285,17 +275,11 @@ def _draw_lengths(level: int, rng: np.random.Generator, workcell: Workcell) -> S
     halves = [(round(rng.uniform(*ends), 5), half_y, half_z) for ends in HALF_LENGTHS[level]]
     reach = [math.hypot(half[0], half_y) for half in halves]
 
-    def wide(found: places.Points) -> bool:
-        least_x, least_y = SPANS[level]
-        return (
-            places.spread([p[0] for p in found]) >= least_x
-            and places.spread([p[1] for p in found]) >= least_y
-        )
-
     def gap(i: int, j: int) -> float:
         return reach[i] + reach[j] + GAP
 
-    points = places.scatter_blocks(rng, workcell, GROUNDS[min(level, 2)], halves, gap, wide)
+    ground, wide = GROUNDS[min(level, 2)], places.wide(*SPANS[level])
+    points = places.scatter_blocks(rng, workcell, ground, halves, gap, wide)
     color = table.drawn_color(rng)
     items = [
         table.block("order", point, half, color, rng.uniform(-BAR_YAW, BAR_YAW))

@@ -5,7 +5,7 @@ carried past.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass
 
 from robospa.geometry import Pose, Vec3
@@ -193,22 +193,3 @@ class Region:
     def over(self, point: Vec3) -> bool:
         """True if `point` [m, world] lies inside, at any height, its edge left out."""
         return self.x[0] < point[0] < self.x[1] and self.y[0] < point[1] < self.y[1]
-
-
-def lying_in(regions: Sequence[Region], lowest: float) -> Near:
-    """In one of `regions`, its origin not below `lowest` [m, world]."""
-
-    def near(pose: Pose, home: Pose) -> bool:
-        x, y, z = pose.position
-        return z >= lowest and any(region.holds(x, y) for region in regions)
-
-    return near
-
-
-def put_into(region: Region, rise: float) -> Near:
-    """Inside `region`, its origin at most `rise` [m] higher than it was at the start."""
-
-    def near(pose: Pose, home: Pose) -> bool:
-        return region.over(pose.position) and pose.position[2] <= home.position[2] + rise
-
-    return near

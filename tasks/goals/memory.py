@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from robospa.geometry import Pose, Quat, Vec3
 from robospa.tasks.events import Event, ObjectRole
 from robospa.tasks.goals.checklist import Checklist, Watch
-from robospa.tasks.goals.conditions import Near, Rests
+from robospa.tasks.goals.conditions import Rests
 from robospa.tasks.goals.lifting import closed_near
 from robospa.tasks.goals.placing import Bystanders
 from robospa.tasks.snapshot import Snapshot
@@ -19,25 +19,6 @@ from robospa.tasks.task import Tracker
 
 STILL = 0.03
 """No end effector may be farther [m] from its start before the cue is hidden."""
-
-MOVED_EARLY = "moved before the cue was hidden"
-
-
-class Stillness:
-    """Largest distance [m] of an end effector from where it was at the start."""
-
-    def __init__(self) -> None:
-        self.motion = 0.0
-        self._origins: tuple[Vec3, ...] = ()
-
-    def start(self, snapshot: Snapshot) -> None:
-        self._origins = tuple(pose.position for pose in snapshot.end_effector)
-
-    def broken(self, snapshot: Snapshot) -> bool:
-        """True once an end effector has moved more than STILL from its start."""
-        for origin, pose in zip(self._origins, snapshot.end_effector, strict=True):
-            self.motion = max(self.motion, math.dist(origin, pose.position))
-        return self.motion > STILL
 
 
 class AfterCue:
@@ -48,7 +29,8 @@ class AfterCue:
         self.needs_contacts = goal.needs_contacts
         self._goal = goal
         self._covers = tuple(covers)
-        self._still = Stillness()
+        self._origins: tuple[Vec3, ...] = ()
+        self._motion = 0.0
         self._hidden_at: float | None = None
         self._over = False
 
@@ -57,7 +39,7 @@ class AfterCue:
         return self._goal.roles
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        self._still.start(snapshot)
+        self._origins = tuple(pose.position for pose in snapshot.end_effector)
         return ()
 
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
@@ -66,10 +48,11 @@ class AfterCue:
             return ()
         if self._hidden_at is None:
             if any(name not in snapshot.poses for name in self._covers):
-                if not self._still.broken(snapshot):
-                    return ()
-                self._over = True
-                return (Event(snapshot.time, "failed", note=MOVED_EARLY),)
+                for origin, pose in zip(self._origins, snapshot.end_effector, strict=True):
+                    self._motion = max(self._motion, math.dist(origin, pose.position))
+                self._over = self._motion > STILL
+                early = Event(snapshot.time, "failed", note="moved before the cue was hidden")
+                return (early,) if self._over else ()
             self._hidden_at = snapshot.time
             return (Event(snapshot.time, "cue_hidden"), *self._goal.start(snapshot))
         events = self._goal.update(snapshot)
@@ -81,7 +64,7 @@ class AfterCue:
         return {
             **self._goal.diagnostics(),
             "cue_hidden_at": -1.0 if self._hidden_at is None else self._hidden_at,
-            "motion_before": self._still.motion,
+            "motion_before": self._motion,
         }
 
 
@@ -165,6 +148,14 @@ class OrientationTarget:
     rotation: Quat
     below: float
 
+    def met(self, pose: Pose, home: Pose) -> bool:
+        """True if it lies so at `home`."""
+        return (
+            pose.position[2] < self.below
+            and math.dist(pose.position[:2], home.position[:2]) < NEAR
+            and angle_between(pose.rotation, self.rotation) < TURN
+        )
+
 
 def restore(targets: Sequence[OrientationTarget], references: Sequence[str]) -> Checklist:
     """Every object turned as asked at its own place, low, not held, all at once.
@@ -173,7 +164,7 @@ def restore(targets: Sequence[OrientationTarget], references: Sequence[str]) -> 
     grippers open. `references` must not be moved: lifting one is an event, not a failure.
     """
     return Checklist(
-        [Rests(t.name, _turned(t), held_radius=TURNED_RADIUS) for t in targets],
+        [Rests(t.name, t.met, held_radius=TURNED_RADIUS) for t in targets],
         released=True,
         radius=0.08,
         early=lambda i, flags: not all(flags.held[:i]),
@@ -181,17 +172,6 @@ def restore(targets: Sequence[OrientationTarget], references: Sequence[str]) -> 
         watch=Bystanders(references),
         figures=("out_of_order", "drops"),
     )
-
-
-def _turned(target: OrientationTarget) -> Near:
-    def near(pose: Pose, home: Pose) -> bool:
-        return (
-            pose.position[2] < target.below
-            and math.dist(pose.position[:2], home.position[:2]) < NEAR
-            and angle_between(pose.rotation, target.rotation) < TURN
-        )
-
-    return near
 
 
 def angle_between(a: Quat, b: Quat) -> float:

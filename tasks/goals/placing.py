@@ -6,6 +6,7 @@ conditions, most of which do not latch, with something watched beside it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 
 from robospa.geometry import Pose, Vec3
@@ -39,8 +40,13 @@ def bring(parts: Sequence[Destination], table_top: float, released: bool = False
     `table_top` [m], counts nowhere; one in a region of `astray` is a diagnostic, no failure.
     """
     lowest = table_top - FALLEN
+
+    def near(part: Destination, pose: Pose, home: Pose) -> bool:
+        x, y, z = pose.position
+        return z >= lowest and any(region.holds(x, y) for region in part.to)
+
     return Checklist(
-        [conditions.Rests(part.name, conditions.lying_in(part.to, lowest)) for part in parts],
+        [conditions.Rests(part.name, partial(near, part)) for part in parts],
         released,
         conditions.HELD_RADIUS,
         handled=[part.name for part in parts],
@@ -98,7 +104,11 @@ def gather(targets: Sequence[str], others: Sequence[str], region: conditions.Reg
     A target counts while it lies no higher than before; the official rule also counts what is
     carried through. A wrong object in the region, at any height, fails for good (official).
     """
-    near = conditions.put_into(region, HEIGHT_TOLERANCE)
+
+    def near(pose: Pose, home: Pose) -> bool:
+        low = pose.position[2] <= home.position[2] + HEIGHT_TOLERANCE
+        return low and region.over(pose.position)
+
     return Checklist(
         [conditions.Rests(name, near, held_radius=CLOSE) for name in targets],
         released=True,
@@ -317,15 +327,10 @@ class _Vessels:
         lowest, highest = float("-inf"), float("inf")
         stack: list[str] = []
         while True:
-            found = next(
-                (
-                    name
-                    for name in rest
-                    if _over(at[name], below, reach) and lowest < at[name][2] - below[2] < highest
-                ),
-                None,
-            )
-            if found is None:
+            for found in rest:
+                if _over(at[found], below, reach) and lowest < at[found][2] - below[2] < highest:
+                    break
+            else:
                 return stack
             stack.append(found)
             rest.remove(found)

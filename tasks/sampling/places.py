@@ -68,9 +68,14 @@ def apart(point: Point, others: Iterable[Point], distance: float) -> bool:
     return True
 
 
-def spread(values: Sequence[float]) -> float:
-    """Largest minus smallest value."""
-    return max(values) - min(values)
+def wide(x: float, y: float) -> Callable[[Points], bool]:
+    """Whether points extend over at least `x` and `y` [m]."""
+
+    def extends(points: Points) -> bool:
+        xs, ys = zip(*points, strict=True)
+        return bool(max(xs) - min(xs) >= x and max(ys) - min(ys) >= y)
+
+    return extends
 
 
 def shuffled(rng: np.random.Generator, items: Sequence[Drawn]) -> list[Drawn]:
