@@ -155,7 +155,6 @@ class JobWorker(Protocol[J_contra, R_co]):
 
     def run(self, job: J_contra) -> R_co:
         """What comes of `job`; raises WorkerDied, and what the job raised."""
-        ...
 
     def kill(self) -> None:
         """End it now; a `run` that waits for it raises WorkerDied."""

@@ -258,13 +258,7 @@ class EvaluationSettings:
 
 
 GROUPS: dict[str, type] = {
-    "selection": Selection,
-    "simulation": Simulation,
-    "timing": Timing,
-    "connection": Connection,
-    "retries": Retries,
-    "compute": Compute,
-    "recording": Recording,
+    f.name: f.type for f in fields(EvaluationSettings) if isinstance(f.type, type)
 }
 """The groups of EvaluationSettings: tables of a settings file."""
 

@@ -105,7 +105,6 @@ class RenderableState(Protocol):
     def draw(self, cameras: Sequence[CameraSpec]) -> list[NDArray[np.uint8]]:
         """Its images, uint8 (height, width, 3), while the world has the same scene loaded; raises
         RenderUnavailable."""
-        ...
 
 
 class World(Protocol):
@@ -120,44 +119,34 @@ class World(Protocol):
         """Execute one policy action of `space` "joint", "ee" or "delta_ee", or when a trial is
         played again JOINTS_FROM_EE; raises ActionError. `poll` is called whenever simulated time
         passes a multiple of 1/50 s. After a refused action (ActionError) nothing has moved."""
-        ...
 
     def observe(self, spec: PolicySpec) -> Observation:
         """The observation that `spec` asks for, at this instant: see `robospa.observation`."""
-        ...
 
     def render(self, camera: CameraSpec) -> NDArray[np.uint8]:
         """One RGB image, uint8 of shape (height, width, 3); raises RenderUnavailable."""
-        ...
 
     def identify(self, camera: CameraSpec) -> NDArray[np.int16]:
         """What each pixel of its image shows, (height, width): an index in `scene.everything`, or
         TABLE or OTHER. Doors and handles are their object's. Raises RenderUnavailable."""
-        ...
 
     def view(self, camera: CameraSpec) -> CameraView:
         """Where this camera is at this instant: which points its pixels show."""
-        ...
 
     def still(self) -> RenderableState:
         """This instant, to be drawn later or never: as cheap as drawing is expensive."""
-        ...
 
     def snapshot(self) -> Snapshot:
         """The state at this instant (contacts included if `load` was asked for them)."""
-        ...
 
     def contacts(self) -> tuple[Contact, ...]:
         """All contacts at this instant, for rare queries: independent of the argument of `load`."""
-        ...
 
     def digest(self) -> str:
         """Hash of the exact state (poses, velocities, joints): equal only if equal to the bit."""
-        ...
 
     def info(self) -> Mapping[str, object]:
         """Simulator, version, device and renderer, for the run's manifest."""
-        ...
 
     def close(self) -> None:
         """Free the simulator's resources."""

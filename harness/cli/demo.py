@@ -8,15 +8,12 @@ scenes, and one page of both.
 from __future__ import annotations
 
 import shutil
-import subprocess
 import sys
-import tempfile
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -27,7 +24,6 @@ if TYPE_CHECKING:
     from robospa.results.records.runs import Run
     from robospa.trial import TrialKey
 
-START_SECONDS = 60.0
 SAMPLE = (
     "Pick_Blocks_Size", "Pick_Mixed_Objects_Distance_B", "Pick_Mixed_Objects_Canonical_A",
     "Pick_Soaps_Relational", "Pick_Mixed_Objects_Multi_View_A", "Press_Stapler_Repeat",
@@ -65,8 +61,8 @@ def demo(
     parse_levels(levels)
     chosen = _select(names, levels, trials)
     folders = {"mistakes": folder / "mistakes", "oracle": folder / "oracle"}
-    _evaluate("mistakes", ["--arg", "kind=all"], chosen, folders["mistakes"], workers)
-    _evaluate("oracle", [], chosen, folders["oracle"], workers)
+    _evaluate("mistakes", {"kind": "all"}, chosen, folders["mistakes"], workers)
+    _evaluate("oracle", {}, chosen, folders["oracle"], workers)
     _film([read_run(each) for each in folders.values()], films)
     report = make_report([read_run(each) for each in folders.values()])
     page = write_report(report, folder / "report") / "report.html"
@@ -108,17 +104,20 @@ def _film(runs: Sequence[Run], most: int) -> None:
 
 
 def _evaluate(
-    policy: str, options: list[str], chosen: Selection, folder: Path, workers: int
+    policy: str, options: dict[str, object], chosen: Selection, folder: Path, workers: int
 ) -> None:
     """Serve `policy`, evaluate it over the wire, print its table."""
     from robospa.harness.cli.eval import run_and_show
+    from robospa.harness.cli.serve import hosted
+    from robospa.harness.factory import policy_factory
     from robospa.harness.running.request import make_request
     from robospa.harness.settings import Compute, Connection, EvaluationSettings, Simulation
+    from robospa.protocol.server import ServerThread
 
-    with server(policy, *options) as url:
-        print(f"\n`robospa serve {policy}` listens at {url}; it is evaluated:", flush=True)
+    with ServerThread(**hosted(policy, policy_factory(policy), options)) as server:
+        print(f"\n`robospa serve {policy}` listens at {server.url}; it is evaluated:", flush=True)
         settings = EvaluationSettings(
-            policy=(url,),
+            policy=(server.url,),
             out=folder,
             selection=chosen,
             simulation=Simulation(run_seed="demo"),  # the same mistakes for everybody
@@ -126,39 +125,3 @@ def _evaluate(
             compute=Compute(workers=workers),
         )
         run_and_show(make_request(settings, arguments={"command": "demo"}))
-
-
-@contextmanager
-def server(policy: str, *options: str) -> Iterator[str]:
-    """`robospa serve POLICY` in a process of its own on a free port of loopback; yields the URL."""
-    command = [sys.executable, "-m", "robospa.harness.cli.main", "serve"]
-    words = [*command, policy, "--port", "0", *options]
-    with tempfile.TemporaryFile("w+") as output:
-        process = subprocess.Popen(words, stdout=output, stderr=subprocess.STDOUT)
-        try:
-            yield _url(process, output)
-        finally:
-            process.terminate()
-            try:
-                process.wait(5.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-
-
-def _url(process: subprocess.Popen[bytes], output: IO[str]) -> str:
-    until = time.monotonic() + START_SECONDS
-    while time.monotonic() < until:
-        output.seek(0)
-        text = output.read()
-        found = [word for word in text.split() if word.startswith("ws://")]
-        if found and text.endswith("\n"):
-            return str(found[0])
-        if process.poll() is not None:
-            raise ServerFailed(f"the policy server ended before it was ready: {text.strip()}")
-        time.sleep(0.05)
-    raise ServerFailed(f"the policy server was not ready after {START_SECONDS:g} s")
-
-
-class ServerFailed(Exception):
-    """The demo's policy server did not start."""

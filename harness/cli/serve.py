@@ -91,7 +91,7 @@ def serve(
             token=token,
             ssl=_tls(certificate, key),
             on_ready=lambda url: print(f"serving {policy} at {url} (Ctrl-C stops)", flush=True),
-            **_hosted(policy, make, given, connections),
+            **hosted(policy, make, given, connections),
         )
 
 
@@ -138,8 +138,8 @@ def options_class(make: Callable[..., object]) -> type[Any] | None:
     return found if isinstance(found, type) and dataclasses.is_dataclass(found) else None
 
 
-def _hosted(
-    policy: str, make: Callable[..., Any], given: dict[str, object], connections: int
+def hosted(
+    policy: str, make: Callable[..., Any], given: dict[str, object], connections: int = 256
 ) -> dict[str, Any]:
     """What the server runs: a shared policy or a factory of one per connection, and its options."""
     from functools import partial

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Protocol
 
 from robospa.results.records.manifest import Processor
 from robospa.results.records.trial_record import RetryRow, TrialRecord
@@ -19,12 +19,11 @@ class RunAborted(Exception):
     """The run cannot go on; what is finished is kept, and the run can be resumed."""
 
 
-class WorkerHandle:
+class WorkerHandle(Protocol):
     """One worker, from the moment that it was asked for, or its place for one more trial. `name` is
     the same for all places of a worker."""
 
-    def __init__(self, name: str) -> None:
-        self.name = name
+    name: str
 
     def another_trial(self) -> WorkerHandle | None:
         """A place for one more trial in the same worker, which is ready; None if there is none."""
@@ -32,15 +31,12 @@ class WorkerHandle:
 
     def send(self, command: Command) -> None:
         """Send it a command; nothing happens if it has ended."""
-        raise NotImplementedError
 
     def messages(self) -> list[Message]:
         """What it has sent since the last call; also after it has ended."""
-        raise NotImplementedError
 
     def exit_status(self) -> str | None:
         """How it ended, in a few words; None while it runs."""
-        raise NotImplementedError
 
     def pending(self) -> bool:
         """Whether it waits for a node to run on, so that it need not be ready soon."""
@@ -48,34 +44,28 @@ class WorkerHandle:
 
     def kill(self) -> None:
         """End it now; `exit_status` is known when this returns."""
-        raise NotImplementedError
 
     def join(self, seconds: float) -> None:
         """Wait until it has ended, `seconds` at most."""
-        raise NotImplementedError
 
     def close(self) -> None:
         """Free what is left of it; it has ended."""
-        raise NotImplementedError
 
 
-class Executor:
+class Executor(Protocol):
     """Starts workers and waits for them."""
 
     def capacity(self) -> int:
         """How many workers there can be now; may change while a run goes on."""
-        raise NotImplementedError
 
     def start(self, name: str) -> WorkerHandle:
         """Start one more worker."""
-        raise NotImplementedError
 
     def wait(self, workers: Sequence[WorkerHandle], seconds: float) -> None:
         """Return as soon as one of `workers` has sent something or ended, after `seconds` at most.
 
         Raises RunAborted if there will never be workers again.
         """
-        raise NotImplementedError
 
     def notes(self) -> list[str]:
         """Lines for the user about the executor itself since the last call."""
@@ -83,6 +73,7 @@ class Executor:
 
     def close(self) -> None:
         """End everything that this executor started; all of its workers have ended."""
+        return None
 
 
 Activity = Literal["simulating", "waiting", "in_policy"]

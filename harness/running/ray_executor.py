@@ -61,8 +61,7 @@ class RayWorker(WorkerHandle):
     """One worker: an actor, once a node has room for it."""
 
     def __init__(self, name: str, executor: RayExecutor) -> None:
-        super().__init__(name)
-        self.node = ""
+        self.name, self.node = name, ""
         self.actor: Any = None
         self.call: Any = None
         """The call of the actor whose result is awaited."""

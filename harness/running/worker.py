@@ -356,8 +356,7 @@ class LocalWorker(executor.WorkerHandle):
     def __init__(
         self, process: Child, pipe: Connection, name: str, spare: Sequence[Connection] = ()
     ) -> None:
-        super().__init__(name)
-        self.process, self.pipe = process, pipe
+        self.process, self.pipe, self.name = process, pipe, name
         self._spare = list(spare)
 
     def another_trial(self) -> LocalWorker | None:
