@@ -12,7 +12,7 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, TypeVar
@@ -280,21 +280,21 @@ def updated(settings: EvaluationSettings, given: Mapping[str, object]) -> Evalua
         near = did_you_mean(unknown, groups)
         raise SettingsError(f"there is no setting {unknown!r}; {near}known are {', '.join(groups)}")
     changes: dict[str, object] = {}
-    for group, kind in GROUPS.items():
+    for group in GROUPS:
         inside = {name: value for name, value in given.items() if groups[name] == group}
         if inside:
-            changes[group] = changed(getattr(settings, group), kind, inside)
+            changes[group] = changed(getattr(settings, group), inside)
     top = {name: value for name, value in given.items() if not groups[name]}
-    return replace(changed(settings, EvaluationSettings, top), **changes)  # type: ignore[arg-type]
+    return replace(changed(settings, top), **changes)  # type: ignore[arg-type]
 
 
-def changed(old: G, kind: type[G], given: Mapping[str, object]) -> G:
+def changed(old: G, given: Mapping[str, object]) -> G:
     """`old` with the values in `given`, each read as its field's type."""
     texts = {name: _text(name, value) for name, value in given.items()}
     # Each entry of a list is one of the choices, not all of it: the group itself checks that.
     lists = {name: text for name, text in texts.items() if name in LISTS and isinstance(text, str)}
     try:
-        read = read_options(kind, {n: value for n, value in texts.items() if n not in lists})
+        read = read_options(type(old), {n: value for n, value in texts.items() if n not in lists})
     except SettingsError:
         raise
     except ValueError as error:
@@ -312,14 +312,9 @@ def _text(name: str, value: object) -> object:
 
 def plain(settings: EvaluationSettings) -> dict[str, dict[str, Value]]:
     """All settings as JSON values by group and name; those in no group under ""."""
-    found: dict[str, dict[str, Value]] = {"": {}}
-    for item in fields(settings):
-        value = getattr(settings, item.name)
-        if is_dataclass(value):
-            found[item.name] = plain_options(value)
     top = plain_options(settings)
-    found[""] = {name: top[name] for name, group in group_of().items() if not group}
-    return found
+    own = {name: top[name] for name, group in group_of().items() if not group}
+    return {"": own} | {group: plain_options(getattr(settings, group)) for group in GROUPS}
 
 
 def flat(settings: EvaluationSettings) -> dict[str, Value]:

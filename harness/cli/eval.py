@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from robospa.harness.cli.options import AsJson, Token, aside, given_flags, print_json, with_flags
-from robospa.harness.running.evaluate import Request, RunAborted
+from robospa.harness.running.evaluate import Request
 from robospa.harness.running.evaluate import evaluate as run_request
+from robospa.harness.running.executor import RunAborted
 from robospa.harness.running.films import FilmsInterrupted
 from robospa.harness.settings import (
     GROUPS,

@@ -274,8 +274,8 @@ def collect(
         {name: value for name, value in given.items() if kinds[name] is kind}
         for kind in (Collection, Compute)
     )
-    compute = changed(Compute(), Compute, machine)
-    order = Order(changed(Collection(), Collection, own), format, Path(out))
+    compute = changed(Compute(), machine)
+    order = Order(changed(Collection(), own), format, Path(out))
     with pool_opener(compute) as open_pool:
         return make(order, open_pool, resume=resume)
 

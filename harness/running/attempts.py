@@ -45,7 +45,28 @@ class LossWriter:
     def write(self, key: TrialKey, message: str, retries: Retries) -> TrialRecord:
         """The record of a trial without a result, which is then on disk; raises StorageError."""
         self._writer = self._writer or RecordWriter(self._folder)
-        record = loss_record(key, message, retries, self._queue)
+        variant = self._queue.info(key)
+        record = TrialRecord(
+            key=key,
+            category=variant.category,
+            instruction="",
+            scene_digest="",
+            end="infrastructure",
+            success=False,
+            done=0,
+            best=0,
+            total=variant.subtasks,
+            candidates=variant.candidates,
+            steps=0,
+            physics_steps=0,
+            policy_calls=0,
+            digest="",
+            actions_digest="",
+            wall_time=0.0,
+            message=message,
+            attempts=len(retries),
+            retries=retries,
+        )
         self._writer.write(record)
         return record
 
@@ -53,32 +74,6 @@ class LossWriter:
         """Close the file, if there is one."""
         if self._writer is not None:
             self._writer.close()
-
-
-def loss_record(key: TrialKey, message: str, retries: Retries, queue: TrialQueue) -> TrialRecord:
-    """The record of a trial that could not be run, in none of the attempts `retries`."""
-    variant = queue.info(key)
-    return TrialRecord(
-        key=key,
-        category=variant.category,
-        instruction="",
-        scene_digest="",
-        end="infrastructure",
-        success=False,
-        done=0,
-        best=0,
-        total=variant.subtasks,
-        candidates=variant.candidates,
-        steps=0,
-        physics_steps=0,
-        policy_calls=0,
-        digest="",
-        actions_digest="",
-        wall_time=0.0,
-        message=message,
-        attempts=len(retries),
-        retries=retries,
-    )
 
 
 FIRST = 5

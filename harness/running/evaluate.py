@@ -19,7 +19,6 @@ from robospa.harness.pool import JobProcess, WorkerDied, WorkerStuck
 from robospa.harness.progress import Progress, summary
 from robospa.harness.running.atomic_file import replace_file, run_lock
 from robospa.harness.running.attempts import attempts_spent, earlier_retries
-from robospa.harness.running.executor import RunAborted
 from robospa.harness.running.films import film_lines, films_of, finish_films
 from robospa.harness.running.manifest import about_machine, add_processor, check_folder, open_run
 from robospa.harness.running.policy_probe import (
@@ -294,6 +293,3 @@ def evaluate(request: Request) -> None:
         for text in about_films:
             progress.note(text)
         remove_partial_files(folder)
-
-
-__all__ = ["Request", "RunAborted", "WorldBroken", "evaluate", "probe_world"]

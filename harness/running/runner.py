@@ -82,14 +82,6 @@ class Slot:
             return float("inf")
         return self.deadline if self.monitor is None else min(self.deadline, self.monitor.deadline)
 
-    def send(self, now: float, trial_seconds: float, stuck_seconds: float) -> None:
-        """Send the worker its trial, which has so many seconds from now on."""
-        assert self.job is not None
-        self.sent, self.started, self.deadline = True, now, now + trial_seconds
-        self.monitor = HeartbeatMonitor(now, stuck_seconds)
-        work = self.job.work
-        self.worker.send(RunTrial(work.key, self.job.target, work.retries))
-
     def lateness(self, now: float) -> str:
         """By how much its worker is late, in words."""
         if not self.ready:
@@ -103,7 +95,7 @@ class Slot:
         """The record of its trial if its worker has written it; the worker has ended."""
         if self.job is None or self.records is None or not self.records.exists():
             return None
-        key = self.job.work.key
+        key = self.job.key
         return next((record for record in read_file(self.records) if record.key == key), None)
 
     def extend(self, seconds: float) -> None:
@@ -115,7 +107,7 @@ class Slot:
 
 def needs_worker_alone(job: TrialJob) -> bool:
     """Whether a worker may have died of this trial."""
-    return any(row.cause in ("worker_ended", "worker_stuck") for row in job.work.retries)
+    return any(row.cause in ("worker_ended", "worker_stuck") for row in job.retries)
 
 
 def beside(slot: Slot, slots: Sequence[Slot]) -> list[Slot]:
@@ -133,15 +125,6 @@ def free(slots: Sequence[Slot], extra: bool) -> Iterator[Slot]:
     for slot in sorted(idle, key=lambda s: len(beside(s, slots))):
         if not any(map(needs_worker_alone, (s.job for s in beside(slot, slots) if s.job))):
             yield slot
-
-
-def stop_all(slots: Sequence[Slot], seconds: float) -> None:
-    """Give idle workers so many `seconds` to close their connections."""
-    for slot in slots:
-        slot.worker.send(Stop())
-    until = time.monotonic() + seconds
-    for slot in slots:
-        slot.worker.join(until - time.monotonic())
 
 
 FALSE_STARTS = 3
@@ -236,7 +219,11 @@ class Runner:
                 self._receive()
                 self._check_deadlines()
                 self._report_status()
-            stop_all(self._slots, STOP_SECONDS)
+            for slot in self._slots:
+                slot.worker.send(Stop())
+            until = time.monotonic() + STOP_SECONDS
+            for slot in self._slots:
+                slot.worker.join(until - time.monotonic())
         except StorageError as error:
             raise RunAborted(str(error)) from error
         finally:
@@ -282,7 +269,11 @@ class Runner:
                 self._send(slot)
 
     def _send(self, slot: Slot) -> None:
-        slot.send(time.monotonic(), self.options.trial_seconds, self.options.stuck_seconds)
+        job, now = slot.job, time.monotonic()
+        assert job is not None
+        slot.sent, slot.started, slot.deadline = True, now, now + self.options.trial_seconds
+        slot.monitor = HeartbeatMonitor(now, self.options.stuck_seconds)
+        slot.worker.send(RunTrial(job.key, job.target, job.retries))
 
     def _receive(self) -> None:
         """Wait until a worker sends something or ends, or a pause is over."""
@@ -343,7 +334,7 @@ class Runner:
         elif (record := slot.written()) is not None:
             self._complete(slot, record)
         else:
-            self._retry(slot.job, TrialLost(slot.job.work.key, RetryRow(cause, text)))
+            self._retry(slot.job, TrialLost(slot.job.key, RetryRow(cause, text)))
 
     def _check_deadlines(self) -> None:
         now = time.monotonic()
@@ -371,9 +362,9 @@ class Runner:
     def _begin(self, slot: Slot) -> None:
         """Put the attempt of `slot` on disk, as one that the end of this driver cuts off, and let
         the policy have the trial."""
-        assert slot.job is not None
-        work = slot.job.work
-        self._losses.write(work.key, CUT_OFF.message, (*work.retries, CUT_OFF))
+        job = slot.job
+        assert job is not None
+        self._losses.write(job.key, CUT_OFF.message, (*job.retries, CUT_OFF))
         slot.worker.send(Proceed())
 
     def _complete(self, slot: Slot, record: TrialRecord) -> None:
@@ -426,12 +417,12 @@ class Runner:
         return True
 
     def _retry(self, job: TrialJob, lost: TrialLost) -> None:
-        work, text, now = job.work, lost.row.message, time.monotonic()
+        text, now = lost.row.message, time.monotonic()
         unfit = lost.fault == "incompatible"
         server = self._scheduler.servers[job.target]
-        retries = (*work.retries, lost.row)
+        retries = (*job.retries, lost.row)
         # On disk at once, so that no later driver forgets it, whatever ends this one.
-        known = self._losses.write(work.key, text, retries) if reached_policy(lost.row) else None
+        known = self._losses.write(job.key, text, retries) if reached_policy(lost.row) else None
         if unfit and len(self._scheduler.servers) == 1:
             raise RunAborted(text)
         was_up = server.up
@@ -446,13 +437,12 @@ class Runner:
             self._scheduler.requeue(job, now, charged)
             return
         most = self.options.attempts
-        if lost.retry and work.attempt < most and attempts_spent(retries) < most:
-            pause = self.options.backoff * 2.0 ** (work.attempt - 1)
-            self.on_note(f"{work.key.slug}: {text}; trying again in {pause:g} s")
-            again = replace(job, work=replace(work, retries=retries))
-            self._scheduler.requeue(again, now + pause, charged)
+        if lost.retry and job.attempt < most and attempts_spent(retries) < most:
+            pause = self.options.backoff * 2.0 ** (job.attempt - 1)
+            self.on_note(f"{job.key.slug}: {text}; trying again in {pause:g} s")
+            self._scheduler.requeue(replace(job, retries=retries), now + pause, charged)
         else:
-            self._record_missing(known or self._losses.write(work.key, text, retries))
+            self._record_missing(known or self._losses.write(job.key, text, retries))
 
     def _record_missing(self, record: TrialRecord) -> None:
         self.on_note(f"{record.key.slug}: {record.message}; recorded as missing")
@@ -478,7 +468,7 @@ class Runner:
         ready = [slot for slot in self._slots if slot.ready]
         workers = [slot for slot in self._slots if not slot.extra]
         running = [
-            (queue.durations.expect(slot.job.work.key), now - slot.started)
+            (queue.durations.expect(slot.job.key), now - slot.started)
             for slot in ready
             if slot.job is not None and slot.sent
         ]

@@ -38,10 +38,14 @@ STAY = 0.8
 
 @dataclass(frozen=True)
 class TrialJob:
-    """A trial and the policy that is to do it."""
+    """A trial to be run for the `attempt`-th time by this driver; `retries` are all attempts that
+    did not count, those of earlier drivers first. `target`: the policy that is to do it, if that
+    is known yet."""
 
-    work: Pending
-    target: str
+    key: TrialKey
+    attempt: int = 1
+    retries: tuple[RetryRow, ...] = ()
+    target: str = ""
 
 
 class Scheduler:
@@ -84,10 +88,10 @@ class Scheduler:
             s.target: self._demand(s, due, now) * (1 if s.target == at else STAY) for s in usable
         }
         server = max(usable, key=lambda s: demands[s.target])
-        work = self.queue.take(self._task(server, due), now)
-        assert work is not None
-        server.start_trial(work.key.task, now)
-        return TrialJob(work, server.target)
+        job = self.queue.take(self._task(server, due), now)
+        assert job is not None
+        server.start_trial(job.key.task, now)
+        return replace(job, target=server.target)
 
     def _taken(self, server: ServerStats) -> bool:
         address = self._one_trial.get(server.target)
@@ -147,12 +151,11 @@ class Scheduler:
             return True
         up = [s for s in self.servers.values() if s.up]
         busy = any(s.running for s in up)
-        return busy or any(job.work.key.task in s.tasks for s in up)
+        return busy or any(job.key.task in s.tasks for s in up)
 
     def requeue(self, job: TrialJob, due: float, charged: bool) -> None:
         """Put the trial of `job` back, not to be run before time `due`."""
-        work = job.work
-        self.queue.requeue(replace(work, attempt=work.attempt + charged), due)
+        self.queue.requeue(replace(job, attempt=job.attempt + charged, target=""), due)
 
     def tasks_without_server(self) -> tuple[str, ...]:
         """Unfinished base tasks for which no server is left."""
@@ -166,16 +169,6 @@ class Scheduler:
         if (due := self.queue.next_due(now)) is not None:
             pauses.append(due)
         return min(pauses, default=None)
-
-
-@dataclass(frozen=True)
-class Pending:
-    """A trial waiting to be run for the `attempt`-th time by this driver; `retries` are all
-    attempts that did not count, those of earlier drivers first."""
-
-    key: TrialKey
-    attempt: int = 1
-    retries: tuple[RetryRow, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -223,8 +216,8 @@ class DurationEstimates:
 class _Group:
     """What is left of one base task: fresh trials by level, retries by the time they are due."""
 
-    fresh: dict[int, deque[Pending]] = field(default_factory=dict)
-    retries: list[tuple[float, int, Pending]] = field(default_factory=list)
+    fresh: dict[int, deque[TrialJob]] = field(default_factory=dict)
+    retries: list[tuple[float, int, TrialJob]] = field(default_factory=list)
 
     def due(self, now: float) -> bool:
         return bool(self.fresh) or (bool(self.retries) and self.retries[0][0] <= now)
@@ -246,11 +239,10 @@ class TrialQueue:
         self._count = 0
         self.durations = DurationEstimates(lambda key: self.info(key).steps)
         self.unsettled = 0
-        self._retries = retries or {}
         for key in sorted(keys):
             by_level = self._groups.setdefault(key.task, _Group()).fresh
-            pending = Pending(key, retries=self._retries.get(key, ()))
-            by_level.setdefault(key.level, deque()).append(pending)
+            job = TrialJob(key, retries=(retries or {}).get(key, ()))
+            by_level.setdefault(key.level, deque()).append(job)
             self.unsettled += 1
 
     def info(self, key: TrialKey) -> VariantInfo:
@@ -288,9 +280,9 @@ class TrialQueue:
 
     def _seconds_left(self, group: _Group) -> float:
         fresh = sum(len(q) * self.durations.expect(q[0].key) for q in group.fresh.values())
-        return fresh + sum(self.durations.expect(work.key) for _, _, work in group.retries)
+        return fresh + sum(self.durations.expect(job.key) for _, _, job in group.retries)
 
-    def take(self, task: str, now: float) -> Pending | None:
+    def take(self, task: str, now: float) -> TrialJob | None:
         """The next trial of `task`: a retry whose pause is over, or the longest; None if none."""
         group = self._groups[task]
         if group.retries and group.retries[0][0] <= now:
@@ -298,16 +290,15 @@ class TrialQueue:
         if not group.fresh:
             return None
         level = max(group.fresh, key=lambda n: (self.durations.expect(group.fresh[n][0].key), -n))
-        pending = group.fresh[level]
-        work = pending.popleft()
-        if not pending:
+        job = group.fresh[level].popleft()
+        if not group.fresh[level]:
             del group.fresh[level]
-        return work
+        return job
 
-    def requeue(self, work: Pending, due: float) -> None:
-        """Run `work` (as it is: the caller counts attempts), not before time `due`."""
+    def requeue(self, job: TrialJob, due: float) -> None:
+        """Run `job` (as it is: the caller counts attempts), not before time `due`."""
         self._count += 1
-        heapq.heappush(self._groups[work.key.task].retries, (due, self._count, work))
+        heapq.heappush(self._groups[job.key.task].retries, (due, self._count, job))
 
     def next_due(self, now: float) -> float | None:
         """When the next retry after `now` is due; None if there is none."""

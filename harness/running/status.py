@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -38,34 +38,26 @@ class TimeBreakdown:
 
     def add(self, record: TrialRecord) -> None:
         """Count one trial that was run."""
-        spent = split(record)
+        spent = {
+            name: sum(record.timing.get(part, 0.0) for part in parts)
+            for name, parts in PURPOSES.items()
+        }
+        spent["other"] = max(0.0, record.wall_time - sum(spent.values()))
         self.recent.append(spent)
-        self.whole = _sum((self.whole, spent))
+        for name, seconds in spent.items():
+            self.whole[name] = self.whole.get(name, 0.0) + seconds
 
     def recent_shares(self) -> dict[str, float]:
         """Shares of the last trials; empty before the first."""
-        return _shares(_sum(tuple(self.recent)))
+        return _shares(self.recent)
 
     def overall_shares(self) -> dict[str, float]:
         """Shares of all trials."""
-        return _shares(self.whole)
+        return _shares([self.whole])
 
 
-def split(record: TrialRecord) -> dict[str, float]:
-    """Seconds of one trial by what is shown."""
-    spent = {
-        name: sum(record.timing.get(part, 0.0) for part in parts)
-        for name, parts in PURPOSES.items()
-    }
-    spent["other"] = max(0.0, record.wall_time - sum(spent.values()))
-    return spent
-
-
-def _sum(parts: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    return {n: sum(part.get(n, 0.0) for part in parts) for n in (*PURPOSES, "other")}
-
-
-def _shares(seconds: Mapping[str, float]) -> dict[str, float]:
+def _shares(parts: Collection[Mapping[str, float]]) -> dict[str, float]:
+    seconds = {n: sum(part.get(n, 0.0) for part in parts) for n in (*PURPOSES, "other")}
     total = sum(seconds.values())
     return {name: s / total for name, s in seconds.items()} if total > 0 else {}
 

@@ -23,11 +23,11 @@ from robospa.harness.running.attempts import (
     IN_A_ROW,
     ErrorVerdict,
     ErrorWatch,
+    LossWriter,
     ProblemWatch,
-    loss_record,
 )
-from robospa.harness.running.evaluate import Request, RunAborted, evaluate
-from robospa.harness.running.record_store import RecordWriter
+from robospa.harness.running.evaluate import Request, evaluate
+from robospa.harness.running.executor import RunAborted
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.scheduler import TrialQueue
 from robospa.protocol.server import ServerThread
@@ -159,9 +159,7 @@ def test_a_loss_is_on_disk_before_the_next_attempt(tmp_path: Path) -> None:
 def test_an_attempt_under_way_is_waited_for_until_its_driver_is_gone(tmp_path: Path) -> None:
     keys = trial_keys(1)
     manifest.write_manifest(tmp_path, make_manifest(RunSettings(), keys))
-    RecordWriter(tmp_path).write(
-        loss_record(keys[0], "", (CUT_OFF,), TrialQueue(keys, fake_task_of))
-    )
+    LossWriter(tmp_path, TrialQueue(keys, fake_task_of)).write(keys[0], "", (CUT_OFF,))
     with run_lock(tmp_path):
         assert not read_run(tmp_path).missing and read_run(tmp_path).waiting
     found = read_run(tmp_path)

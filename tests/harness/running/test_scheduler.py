@@ -11,7 +11,7 @@ import pytest
 from fake_runs import trial_record
 from run_fakes import LIMIT, fake_task_of, trial_keys
 
-from robospa.harness.running.scheduler import Pending, Scheduler, TrialJob, TrialQueue
+from robospa.harness.running.scheduler import Scheduler, TrialJob, TrialQueue
 from robospa.harness.running.worker import task_finder
 from robospa.harness.worlds import TASK_PARTS
 from robospa.results.records.trial_record import TrialRecord
@@ -75,7 +75,7 @@ class Simulation:
                 charged = self.scheduler.lost(job, self.now, fault, "gone")
                 self.scheduler.requeue(job, self.now, charged)
                 continue
-            done = record(job.work.key, 1000 * waits)
+            done = record(job.key, 1000 * waits)
             self.scheduler.done(job, done, self.now, 1.0 + waits)
             self.after(len(self.settled))
             self.settled.append(job)
@@ -102,7 +102,7 @@ def next_job(scheduler: Scheduler, now: float = 0.0, at: str = "") -> TrialJob:
 
 
 def switches(simulation: Simulation, target: str) -> int:
-    tasks = [job.work.key.task for job in simulation.order if job.target == target]
+    tasks = [job.key.task for job in simulation.order if job.target == target]
     return sum(a != b for a, b in pairwise(tasks))
 
 
@@ -122,7 +122,7 @@ def test_with_a_server_for_every_task_no_server_sees_a_change() -> None:
     simulation = Simulation(scheduler, 4, {f"ws://{task}": 0.1 for task in TASKS})
     simulation.run()
     assert all(switches(simulation, f"ws://{task}") == 0 for task in TASKS)
-    assert all(job.target == f"ws://{job.work.key.task}" for job in simulation.order)
+    assert all(job.target == f"ws://{job.key.task}" for job in simulation.order)
 
 
 def test_a_server_that_gets_slow_is_left_and_asked_again_later() -> None:
@@ -151,10 +151,10 @@ def test_trials_of_a_server_that_goes_away_are_done_by_the_other() -> None:
         schedule(keys(), equal("a", "b")), 6, {"a": 0.1, "b": 0.1}, {"a": (5.0, 1e9)}
     )
     simulation.run()
-    assert sorted(job.work.key for job in simulation.settled) == sorted(keys())
+    assert sorted(job.key for job in simulation.settled) == sorted(keys())
     # Its line broke under the trials that were running there: one attempt each, and no more.
-    assert {job.work.attempt for job in simulation.settled} == {1, 2}
-    assert sum(job.work.attempt == 2 for job in simulation.settled) <= 6
+    assert {job.attempt for job in simulation.settled} == {1, 2}
+    assert sum(job.attempt == 2 for job in simulation.settled) <= 6
     tried = [job for job in simulation.order if job.target == "a"]
     assert len(tried) - len([j for j in simulation.settled if j.target == "a"]) < 20
 
@@ -189,10 +189,10 @@ def test_waiting_for_the_only_server_of_a_task_is_charged_when_all_else_is_done(
     assert later.target == "a"
     assert not scheduler.lost(later, 61.0, "unreachable")  # the other server still runs a trial
     scheduler.requeue(later, 61.0, False)
-    scheduler.done(jobs["b"], record(jobs["b"].work.key, 1.0), 61.0, 1.0)
+    scheduler.done(jobs["b"], record(jobs["b"].key, 1.0), 61.0, 1.0)
     rest = next_job(scheduler, 99.0)
     if rest.target == "b":
-        scheduler.done(rest, record(rest.work.key, 1.0), 99.0, 1.0)
+        scheduler.done(rest, record(rest.key, 1.0), 99.0, 1.0)
         rest = next_job(scheduler, 99.0)
     assert rest.target == "a"
     assert scheduler.lost(rest, 99.0, "unreachable")  # nobody else has anything to do
@@ -225,7 +225,7 @@ def test_a_server_with_one_state_for_all_does_one_trial_at_a_time() -> None:
     assert sum(target in shared for target in taken) == 1
     assert taken.count("ws://free") == 3 and jobs[-1] is None
     first = next(job for job in jobs if job is not None and job.target in shared)
-    scheduler.done(first, record(first.work.key, 1.0), 1.0, 1.0)
+    scheduler.done(first, record(first.key, 1.0), 1.0, 1.0)
     assert next_job(scheduler, 1.0).target in shared
 
 
@@ -248,11 +248,11 @@ def test_a_retry_waits_for_its_time_and_then_goes_first() -> None:
 def test_the_level_that_takes_longest_goes_first() -> None:
     slow, quick = TrialKey("Pick_Fake", 1, 7), TrialKey("Pick_Fake", 2, 7)
     queue = TrialQueue([slow, quick, replace(slow, seed=8), replace(quick, seed=8)], fake_task_of)
-    assert queue.take("Pick_Fake", 0.0) == Pending(slow)  # equal limits: in order
+    assert queue.take("Pick_Fake", 0.0) == TrialJob(slow)  # equal limits: in order
     queue.durations.add(slow, 9.0)
     queue.durations.add(quick, 1.0)
-    assert queue.take("Pick_Fake", 0.0) == Pending(replace(slow, seed=8))
-    assert queue.take("Pick_Fake", 0.0) == Pending(quick)
+    assert queue.take("Pick_Fake", 0.0) == TrialJob(replace(slow, seed=8))
+    assert queue.take("Pick_Fake", 0.0) == TrialJob(quick)
 
 
 def test_what_is_expected_moves_from_the_step_limit_to_what_was_measured() -> None:
