@@ -3,6 +3,7 @@ a data set."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -188,16 +189,17 @@ def _convert(folder: Path, out: Path, layout: str, images: str, as_json: bool) -
     from robospa.harness.datasets.imports import import_recordings
     from robospa.harness.official.recordings import find_recordings
 
-    found = import_recordings(find_recordings(folder), folder, layout, out, images)
-    for why, count in found.left_out.most_common():
+    made = import_recordings(find_recordings(folder), folder, layout, out, images)
+    left_out = Counter(row["why"] for row in made.settings["left_out"])
+    for why, count in left_out.most_common():
         aside(f"robospa: {count} recordings are left out: {why}")
-    lacks = list(found.made.settings["absent"])
+    lacks = list(made.settings["absent"])
     if as_json:
-        counts = {"episodes": found.made.episodes, "frames": found.made.frames}
-        print_json({"out": out, **counts, "absent": lacks, "left_out": dict(found.left_out)})
+        counts = {"episodes": made.episodes, "frames": made.frames}
+        print_json({"out": out, **counts, "absent": lacks, "left_out": dict(left_out)})
         return
     absent = ", ".join(lacks)
-    print(f"{out}: {found.made.episodes} official recordings; they do not have {absent}")
+    print(f"{out}: {made.episodes} official recordings; they do not have {absent}")
     print(f"robospa collect --verify {quote(str(out))} checks hashes and counts")
 
 

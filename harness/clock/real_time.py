@@ -13,7 +13,7 @@ thought is left out of it, and a time in which the robot held leaves out nothing
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,7 +39,7 @@ in ACT (Zhao et al., 2023)."""
 
 
 @dataclass
-class _Chunk:
+class Chunk:
     """An answer: the actions from the instant of its observation, before which `start` actions had
     been executed. `query`: its number from 0."""
 
@@ -64,7 +64,7 @@ class Remaining:
     execute: int | None = None
     executed: int = 0
     """Actions that were executed; times in which the robot held do not count."""
-    _chunks: list[_Chunk] = field(default_factory=list)
+    _chunks: list[Chunk] = field(default_factory=list)
 
     @property
     def left(self) -> int:
@@ -79,11 +79,10 @@ class Remaining:
         since = self.executed - self._chunks[-1].start
         return self.rule.after is not None and since >= self.rule.after
 
-    def arrive(self, query: int, start: int, actions: Actions) -> None:
-        """The answer to a query, of which the observation had seen `start` executed actions."""
-        if self.rule.kind == "wait" and self.execute is not None:
-            actions = actions[: self.execute]
-        chunk = _Chunk(query, start, actions)
+    def arrive(self, chunk: Chunk) -> None:
+        """The answer to a query."""
+        if self.rule.kind == "wait":
+            chunk = replace(chunk, actions=chunk.actions[: self.execute])
         if chunk.end <= self.executed:  # it came too late: what is left of the last one goes on
             return
         kept = self._chunks if self.rule.kind == "ensemble" else []
@@ -114,17 +113,6 @@ class Remaining:
         return newest.actions[self.executed - newest.start :]
 
 
-@dataclass(frozen=True)
-class _Thinking:
-    """An answer under way: `due` is the period in which it takes over, `start` how many actions its
-    observation had seen executed."""
-
-    query: int
-    due: int
-    start: int
-    actions: Actions
-
-
 class RealTime:
     """A trial under a real clock. `log` says what came of it, for the record."""
 
@@ -137,7 +125,8 @@ class RealTime:
         self.remaining = Remaining(clock.switching, self.spec.execute)
         self.log = MotionLog(clock.period_ms / 1000.0)
         self._latencies = clock.latency.draws(policy_seed)
-        self._thinking: _Thinking | None = None
+        self._thinking: tuple[int, Chunk] | None = None
+        """An answer under way, and the period in which it takes over."""
         self._joints = run.robot.action_space("joint").bodies
 
     def act(self, step_limit: int) -> str:
@@ -163,9 +152,9 @@ class RealTime:
             committed = self._committed()
             actions = self.answers.next_actions(self.run, self.spec, committed, start)
             latency = next(self._latencies)
-            self.log.ask(period, latency)
-            due = period + self.clock.delay(latency)
-            self._thinking = _Thinking(query, due, start, actions)
+            self.log.asked.append(period)
+            self.log.latencies.append(latency)
+            self._thinking = period + self.clock.delay(latency), Chunk(query, start, actions)
             self._arrive(period)
 
     def _committed(self) -> Committed | None:
@@ -182,11 +171,10 @@ class RealTime:
 
     def _arrive(self, period: int) -> None:
         """The answer takes over if its time has come."""
-        done = self._thinking
-        if done is not None and period >= done.due:
-            self._thinking = None
+        if self._thinking is not None and period >= self._thinking[0]:
+            chunk, self._thinking = self._thinking[1], None
             self.log.arrived.append(period)
-            self.remaining.arrive(done.query, done.start, done.actions)
+            self.remaining.arrive(chunk)
 
     def _execute(self) -> bool:
         """One period; True if the goal was met or lost during it."""
@@ -198,7 +186,9 @@ class RealTime:
             action, source = taken
         stopped = run.execute(action, self.spec.action)
         joints = action if run.last_joints is None else run.last_joints
-        self.log.add(source, self._thinking is not None, joints[self._joints])
+        self.log.sources.append(source)
+        self.log.blind.append(self._thinking is not None)
+        self.log.targets.append(joints[self._joints])
         return stopped
 
 
@@ -251,17 +241,6 @@ class MotionLog:
     asked: list[int] = field(default_factory=list)
     arrived: list[int] = field(default_factory=list)
     latencies: list[float] = field(default_factory=list)
-
-    def ask(self, period: int, latency: float) -> None:
-        """The policy was asked."""
-        self.asked.append(period)
-        self.latencies.append(latency)
-
-    def add(self, source: int, blind: bool, targets: NDArray[np.float32]) -> None:
-        """A period is over."""
-        self.sources.append(source)
-        self.blind.append(blind)
-        self.targets.append(targets)
 
     def held(self) -> list[tuple[int, int]]:
         """Spans of periods in which the robot held: the first, and the first after it."""

@@ -7,7 +7,6 @@ and origin are fitted to the answers.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import permutations
 
 import numpy as np
@@ -120,55 +119,35 @@ def _columns(order: Callable[[Columns, Columns], Columns], kind: str = "") -> Un
     return _given(changed, kind)
 
 
-def _grippers(change: Callable[[Array], Array]) -> Undo:
-    def changed(case: AnswerSample) -> Array:
-        given, grippers = case.given.copy(), case.space.grippers
-        given[:, grippers] = change(given[:, grippers])
-        return given
-
-    return _given(changed)
-
-
-def _rescaled(ends: tuple[float, float], grippers: Array) -> Array:
-    """Grippers that are closed and open at `ends`, as ours."""
-    return (grippers - ends[0]) / (ends[1] - ends[0])
-
-
-def _joints(change: Callable[[AnswerSample, Array], Array]) -> Undo:
-    def changed(case: AnswerSample) -> Array:
-        given, joints = case.given.copy(), case.space.bodies
-        given[:, joints] = change(case, given[:, joints])
-        return given
-
-    return _given(changed, "joint")
-
-
-def _poses(change: Callable[[Array, ArmColumns], None]) -> Undo:
-    """`change` writes into a copy of the answer, once for the columns of each arm."""
+def _arms(
+    columns: Callable[[ArmColumns], Columns | int | slice],
+    change: Callable[[Array, Array], Array],
+    kind: str = "",
+) -> Undo:
+    """`change(given, now)` is done to these columns of each arm, of which `now` is the command."""
 
     def changed(case: AnswerSample) -> Array:
         given = case.given.copy()
         for arm in case.space.arms:
-            change(given, arm)
+            own = columns(arm)
+            given[:, own] = change(given[:, own], case.now[own])
         return given
 
-    return _given(changed, "ee")
+    return _given(changed, kind)
 
 
-def _positions(change: Callable[[Array], Array]) -> Undo:
-    def changed(given: Array, arm: ArmColumns) -> None:
-        given[:, arm.position] = change(given[:, arm.position])
+def _joints(change: Callable[[Array, Array], Array]) -> Undo:
+    return _arms(lambda arm: arm.body, change, "joint")
 
-    return _poses(changed)
+
+def _grippers(shut: float, wide: float) -> Undo:
+    """Of grippers that are closed at `shut` and open at `wide`."""
+    return _arms(lambda arm: arm.gripper, lambda given, now: (given - shut) / (wide - shut))
 
 
 def _quaternions(order: Columns) -> Undo:
     """Number i of our quaternions, w x y z, is number order[i] of theirs."""
-
-    def changed(given: Array, arm: ArmColumns) -> None:
-        given[:, arm.quaternion] = given[:, arm.quaternion][:, order]
-
-    return _poses(changed)
+    return _arms(lambda arm: arm.quaternion, lambda given, now: given[:, order], "ee")
 
 
 def _later(shift: int, stride: int = 1) -> Undo:
@@ -305,21 +284,17 @@ UNDO: dict[str, dict[str, Undo]] = {
         "joints reversed": _columns(lambda a, b: [*a[-2::-1], a[-1], *b[-2::-1], b[-1]], "joint"),
     },
     "units": {
-        "degrees": _joints(lambda case, joints: np.radians(joints)),
-        "millimetres": _positions(lambda positions: positions / 1000.0),
+        "degrees": _joints(lambda q, now: np.radians(q)),
+        "millimetres": _arms(lambda arm: arm.position, lambda given, now: given / 1000.0, "ee"),
     },
     "quaternion": {
         "quaternion x y z w": _quaternions([3, 0, 1, 2]),
         "quaternion slip": _quaternions([1, 2, 3, 0]),
     },
-    "grippers": {
-        f"gripper {name}": _grippers(partial(_rescaled, ends)) for name, ends in GRIPPERS.items()
-    },
+    "grippers": {f"gripper {name}": _grippers(*ends) for name, ends in GRIPPERS.items()},
     "delta": {
-        "delta from the start": _joints(lambda case, q: case.now[case.space.bodies] + q),
-        "delta from the last": _joints(
-            lambda case, q: case.now[case.space.bodies] + np.cumsum(q, axis=0)
-        ),
+        "delta from the start": _joints(lambda q, now: now + q),
+        "delta from the last": _joints(lambda q, now: now + np.cumsum(q, axis=0)),
         "pose delta from the start": _differences(),
         "pose delta from the last": _differences(each=True),
         "position delta from the start": _differences(turned=False),

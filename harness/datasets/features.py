@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 UNSTATED = "unstated"
 """The robot of recordings that do not say theirs."""
-NOTHING = ""
-"""The subtask of frames in which nothing in particular is being done; its index is 0."""
 
 
 class EpisodeMisfit(Exception):
@@ -202,46 +200,6 @@ def facts_of(episode: DatasetEpisode) -> dict[str, object]:
     if "seed" in episode.absent:  # of some recordings of a data set it is known
         found["seed"] = None
     return {name: of for name, of in found.items() if name == "seed" or name not in episode.absent}
-
-
-class NumberedTexts:
-    """What a data set holds so far: how many `episodes` and `frames`, and the number of each
-    sentence (`tasks`) and subtask, in the order in which they came."""
-
-    def __init__(self) -> None:
-        self.tasks: dict[str, int] = {}
-        self.subtasks = {NOTHING: 0}
-        self.episodes = self.frames = 0
-
-    def rows(self, episode: DatasetEpisode) -> dict[str, NDArray[np.generic]]:
-        """The numbers of `episode` as the next one, by feature, (T, D), or (T,) for a feature of
-        one number; its texts are among those that are numbered."""
-        task = self.tasks.setdefault(episode.instructions[0], len(self.tasks))
-        for text in episode.subtasks:
-            self.subtasks.setdefault(text, len(self.subtasks))
-        texts = np.array([0, *(self.subtasks[text] for text in episode.subtasks)])
-        count, objects = len(episode), episode.environment_state
-        frames = np.arange(count)
-        found: dict[str, NDArray[np.generic]] = {
-            "observation.state": episode.commanded,
-            **({ENVIRONMENT: objects} if objects.size else {}),
-            "action": episode.action,
-            "measured_state": episode.measured,
-            "ee_pose": episode.ee.reshape(count, len(POSES)),
-            "sim_time": episode.sim_time.astype(np.float32),
-            "subtask_index": texts[episode.subtask + 1].astype(np.int64),
-            "label": episode.label.astype(np.int64),
-            "timestamp": (frames / FPS).astype(np.float32),
-            "frame_index": frames,
-            "episode_index": np.full(count, self.episodes),
-            "index": self.frames + frames,
-            "task_index": np.full(count, task),
-        }
-        return {name: of for name, of in found.items() if name not in episode.absent}
-
-    def add(self, episode: DatasetEpisode) -> None:
-        """Count `episode`, which is written."""
-        self.episodes, self.frames = self.episodes + 1, self.frames + len(episode)
 
 
 def frame_schema(layout: EpisodeLayout) -> pa.Schema:

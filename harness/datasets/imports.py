@@ -10,9 +10,7 @@ scenes nobody can play them again, so verification looks at hashes and counts al
 
 import shlex
 import shutil
-from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -50,24 +48,15 @@ OFFICIAL = "official"
 """The kind of their episodes."""
 
 
-@dataclass(frozen=True)
-class Imported:
-    """A finished data set: how much there is of it, and why recordings are not in it, with how many
-    each."""
-
-    made: DatasetRecord
-    left_out: Counter[str]
-
-
 def import_recordings(
     recordings: Sequence[OfficialRecording], home: Path, layout: str, out: Path, images: str = AUTO
-) -> Imported:
+) -> DatasetRecord:
     """Write the official `recordings`, which lie below `home`, as a data set in `out`.
 
     `images` is how pictures are kept; robotwin-hdf5 has the files as they are. What cannot be read,
-    or does not fit the first, is left out with its reason. Raises SettingsError for a format that
-    does not exist or a folder that is not empty, DatasetError if no recording is left,
-    CodecMissing, StorageError.
+    or does not fit the first, is left out with its reason, in the record's settings. Raises
+    SettingsError for a format that does not exist or a folder that is not empty, DatasetError if no
+    recording is left, CodecMissing, StorageError.
     """
     codec = image_codec(layout, images)
     if (out / MANIFEST).exists() or (out.is_dir() and any(out.iterdir())):
@@ -81,8 +70,7 @@ def import_recordings(
     sources = _sources(recordings, home, "png" if layout == "robotwin-hdf5" else codec, left_out)
     manifest = DatasetManifest(shlex.join(words), settings)
     writer = partial(Copies, home=home) if layout == "robotwin-hdf5" else None
-    made = pack_episodes(layout, out, sources, manifest, writer=writer, expected=len(recordings))
-    return Imported(made, Counter(row["why"] for row in left_out))
+    return pack_episodes(layout, out, sources, manifest, writer=writer, expected=len(recordings))
 
 
 def _sources(

@@ -52,6 +52,8 @@ BUFFERED = 100
 """Episodes of version 3.0 whose rows are written at a time."""
 V3, V21 = "v3.0", "v2.1"
 COMMANDED = "observation.state"
+NOTHING = ""
+"""The subtask of frames in which nothing in particular is being done; its index is 0."""
 JsonObject = dict[str, object]
 
 
@@ -66,34 +68,57 @@ class LeRobotWriter:
 
     def __init__(self, folder: Path, layout: EpisodeLayout) -> None:
         self._folder, self._layout = folder, layout
-        self._written = features.NumberedTexts()
+        self._count = self._frames = 0
+        self._tasks: dict[str, int] = {}
+        self._subtasks = {NOTHING: 0}
         (folder / "meta").mkdir(parents=True, exist_ok=True)
 
     def _numbers(self, episode: DatasetEpisode) -> tuple[dict[str, NDArray[Any]], dict[str, Stats]]:
+        """The numbers of the next `episode`, by feature, (T, D), or (T,) for a feature of one
+        number, and their statistics; its texts are numbered in the order in which they come."""
         self._layout.check(episode)
-        numbers = self._written.rows(episode)
+        task = self._tasks.setdefault(episode.instructions[0], len(self._tasks))
+        for text in episode.subtasks:
+            self._subtasks.setdefault(text, len(self._subtasks))
+        texts = np.array([0, *(self._subtasks[text] for text in episode.subtasks)])
+        count, objects = len(episode), episode.environment_state
+        frames = np.arange(count)
+        found: dict[str, NDArray[Any]] = {
+            "observation.state": episode.commanded,
+            **({features.ENVIRONMENT: objects} if objects.size else {}),
+            "action": episode.action,
+            "measured_state": episode.measured,
+            "ee_pose": episode.ee.reshape(count, len(features.POSES)),
+            "sim_time": episode.sim_time.astype(np.float32),
+            "subtask_index": texts[episode.subtask + 1].astype(np.int64),
+            "label": episode.label.astype(np.int64),
+            "timestamp": (frames / FPS).astype(np.float32),
+            "frame_index": frames,
+            "episode_index": np.full(count, self._count),
+            "index": self._frames + frames,
+            "task_index": np.full(count, task),
+        }
+        numbers = {name: of for name, of in found.items() if name not in episode.absent}
         return numbers, {n: row_stats(of.reshape(len(of), -1)) for n, of in numbers.items()}
 
     def _row(self, episode: DatasetEpisode) -> JsonObject:
-        return {
-            "episode_index": self._written.episodes,
-            "tasks": [episode.instructions[0]],
-            "length": len(episode),
-        }
+        """What both versions say of `episode`, which is counted now."""
+        index, length = self._count, len(episode)
+        self._count, self._frames = index + 1, self._frames + length
+        return {"episode_index": index, "tasks": [episode.instructions[0]], "length": length}
 
     def _write_info(self, **counts: object) -> None:
-        written, films = self._written, self._layout.films
         info = {
             "codebase_version": self.version,
             "robot_type": self._layout.robot,
-            "total_episodes": written.episodes,
-            "total_frames": written.frames,
-            "total_tasks": len(written.tasks),
+            "total_episodes": self._count,
+            "total_frames": self._frames,
+            "total_tasks": len(self._tasks),
             **counts,
             "fps": FPS,
-            "splits": {"train": f"0:{written.episodes}"},
+            "splits": {"train": f"0:{self._count}"},
             "data_path": self.paths[0],
-            "video_path": self.paths[1] if films else None,
+            "video_path": self.paths[1] if self._layout.films else None,
             "features": features.described(self._layout, self.depth_key),
         }
         self._write_json("info", info)
@@ -103,9 +128,9 @@ class LeRobotWriter:
         (self._folder / "meta" / f"{name}.json").write_text(text, encoding="utf-8")
 
     def _texts(self) -> dict[str, Mapping[str, int]]:
-        found: dict[str, Mapping[str, int]] = {"task": self._written.tasks}
+        found: dict[str, Mapping[str, int]] = {"task": self._tasks}
         if "subtask_index" not in self._layout.absent:
-            found["subtask"] = self._written.subtasks
+            found["subtask"] = self._subtasks
         return found
 
 
@@ -131,7 +156,7 @@ class LeRobotV21(LeRobotWriter):
 
         numbers, stats = self._numbers(episode)
         stats.update({picture_key(c): colours(of).stats() for c, of in episode.pictures.items()})
-        index = self._written.episodes
+        index = self._count
         where = {"episode_chunk": index // CHUNK, "episode_index": index}
         name = self.paths[0].format(**where)
         path = self._folder / name
@@ -149,7 +174,6 @@ class LeRobotV21(LeRobotWriter):
             for feature, of in stats.items()
         }
         self._stats.write(json_line({"episode_index": index, "stats": plain}))
-        self._written.add(episode)
         return name
 
     def close(self) -> None:
@@ -160,8 +184,7 @@ class LeRobotV21(LeRobotWriter):
             with self._lines(f"{name}s") as file:
                 for text, number in texts.items():
                     file.write(json_line({f"{name}_index": number, name: text}))
-        count = self._written.episodes
-        videos, chunks = count * len(self._layout.films), -(-count // CHUNK)
+        videos, chunks = self._count * len(self._layout.films), -(-self._count // CHUNK)
         self._write_info(total_videos=videos, total_chunks=chunks, chunks_size=CHUNK)
 
 
@@ -196,9 +219,8 @@ class LeRobotV3(LeRobotWriter):
             found = colours(seen)
             self._colours[camera].merge(found)
             stats[picture_key(camera)] = found.stats()
-        first = self._written.frames
-        row = self._row(episode)
-        row |= {"dataset_from_index": first, "dataset_to_index": first + len(episode)}
+        first, row = self._frames, self._row(episode)
+        row |= {"dataset_from_index": first, "dataset_to_index": self._frames}
         row |= features.facts_of(episode)
         row |= self._add_films(episode)
         chunk, file = self._data.add(features.frame_table(self._layout, numbers, episode.pictures))
@@ -208,7 +230,6 @@ class LeRobotV3(LeRobotWriter):
         self._waiting.append(row)
         if len(self._waiting) == BUFFERED:
             self._write_rows()
-        self._written.add(episode)
         return ""
 
     def _add_films(self, episode: DatasetEpisode) -> JsonObject:

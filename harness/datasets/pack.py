@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,18 +42,7 @@ PART = ".packing"
 """Where a data set is written, in its folder, until all but `robospa.json` is there."""
 
 
-class Writer(Protocol):
-    """Writes one format."""
-
-    def add(self, episode: DatasetEpisode) -> str:
-        """Write the next episode; its own file below the folder, or ""."""
-        ...
-
-    def close(self) -> None:
-        """Finish the data set's files."""
-        ...
-
-
+Writer = lerobot.LeRobotV3 | lerobot.LeRobotV21 | robotwin.RoboTwin
 Source = tuple[str, DatasetEpisode]
 """An episode with a name for messages."""
 MakeWriter = Callable[[Path, EpisodeLayout], Writer]
@@ -78,9 +66,11 @@ class DatasetFormat:
     misfits: Callable[[Path, Sequence[EpisodeLine]], Iterable[str]]
 
 
-def _lerobot(title: str, writer: type[lerobot.LeRobotWriter]) -> DatasetFormat:
+def _lerobot(
+    title: str, writer: type[lerobot.LeRobotV3] | type[lerobot.LeRobotV21]
+) -> DatasetFormat:
     misfits = partial(lerobot.misfits, writer.version)
-    return DatasetFormat(title, "pyarrow", FILMED, writer, lerobot.commands, misfits)  # type: ignore[arg-type]
+    return DatasetFormat(title, "pyarrow", FILMED, writer, lerobot.commands, misfits)
 
 
 FORMATS: Mapping[str, DatasetFormat] = {

@@ -183,35 +183,21 @@ class FilmSink:
         self._frames += 1
         self._file.mux(self._stream.encode(frame))
 
-    def finish(self) -> tuple[bytes]:
+    def finish(self) -> bytes:
         """The whole film."""
         self._file.mux(self._stream.encode())
         self._file.close()
-        return (self._bytes.getvalue(),)
+        return self._bytes.getvalue()
 
 
-class StillSink:
-    """A file of its own for every frame of a camera."""
+def _file_of(image: Picture, codec: str) -> bytes:
+    """A file of the RGB picture (height, width, 3)."""
+    from PIL import Image
 
-    def __init__(self, _: CameraSpec, codec: str) -> None:
-        from PIL import Image
-
-        self._image, self._codec = Image, codec
-        self._frames: list[bytes] = []
-
-    def add(self, image: Picture) -> None:
-        """Append an RGB picture (height, width, 3)."""
-        stream = io.BytesIO()
-        made = self._image.fromarray(np.ascontiguousarray(image))
-        if self._codec == "png":
-            made.save(stream, "PNG", compress_level=6)
-        else:
-            made.save(stream, "JPEG", quality=JPEG_QUALITY)
-        self._frames.append(stream.getvalue())
-
-    def finish(self) -> tuple[bytes, ...]:
-        """All of them."""
-        return tuple(self._frames)
+    stream = io.BytesIO()
+    options = {"compress_level": 6} if codec == "png" else {"quality": JPEG_QUALITY}
+    Image.fromarray(np.ascontiguousarray(image)).save(stream, codec, **options)
+    return stream.getvalue()
 
 
 def encode(
@@ -224,14 +210,18 @@ def encode(
     if not cameras:
         return {}
     require(codec)
-    kind = FilmSink if codec in FILM_CODECS else StillSink
-    sinks: list[FilmSink | StillSink] = [kind(camera, codec) for camera in cameras]
-    for images in frames:
-        for sink, image in zip(sinks, images, strict=True):
-            sink.add(image)
+    if codec in FILM_CODECS:
+        films = [FilmSink(camera, codec) for camera in cameras]
+        for images in frames:
+            for film, image in zip(films, images, strict=True):
+                film.add(image)
+        files = [(film.finish(),) for film in films]
+    else:
+        stills = ([_file_of(image, codec) for image in row] for row in frames)
+        files = list(zip(*stills, strict=True))
     return {
-        camera.name: Pictures(codec, camera.width, camera.height, sink.finish())
-        for camera, sink in zip(cameras, sinks, strict=True)
+        camera.name: Pictures(codec, camera.width, camera.height, of)
+        for camera, of in zip(cameras, files, strict=True)
     }
 
 

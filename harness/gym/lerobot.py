@@ -70,19 +70,16 @@ class LeRobotEnv(gymnasium.Wrapper[Observation, Any, Observation, Any]):
         """Start the trial of accepted seed number `seed`, counted from 0, round and round."""
         trial = None if seed is None else self._seeds[seed % len(self._seeds)]
         observation, info = self._inner.reset(seed=trial)
-        return _as_lerobot(observation), _with_success(info)
+        return _as_lerobot(observation), {**info, "is_success": info["success"]}
 
     def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, Info]:
         observation, reward, terminated, truncated, info = self._inner.step(action)
-        return _as_lerobot(observation), reward, terminated, truncated, _with_success(info)
+        told = {**info, "is_success": info["success"]}
+        return _as_lerobot(observation), reward, terminated, truncated, told
 
 
 def _as_lerobot(observation: Observation) -> Observation:
     return {"pixels": observation["images"], "agent_pos": observation["state"]}
-
-
-def _with_success(info: Info) -> Info:
-    return {**info, "is_success": info["success"]}
 
 
 @EnvConfig.register_subclass("robospa")

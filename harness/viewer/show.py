@@ -17,7 +17,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, redirect_stdout
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -53,6 +53,8 @@ if TYPE_CHECKING:
 
 UNLISTED = frozenset({"approached"})
 """Kinds of events that are too many to be a list: a gripper came near something."""
+CHANGES = ("subtask_done", "subtask_undone")
+"""Kinds of events that change what is still to be done."""
 
 
 @dataclass(frozen=True)
@@ -84,73 +86,55 @@ class Playback:
 
     `times` [s, simulated] rise from 0; `frames` has the poses of all bodies at each of them.
     `names` are what a reader calls the objects, `subtasks` the numbers of the subtasks (from 0)
-    that need an object, and `changes` the times at which one was done (True) or undone. `failure`
-    is the type of the trial's failure with its evidence, empty for a success.
+    that need an object.
     """
 
-    title: str
-    instruction: str
-    outcome: str
+    record: TrialRecord
     times: Sequence[float]
     frames: Sequence[Mapping[str, Pose]]
-    moments: Sequence[Moment]
     names: Mapping[str, str]
     subtasks: Mapping[str, tuple[int, ...]]
-    changes: Sequence[tuple[float, int, bool]]
-    failure: str = ""
+
+    @property
+    def title(self) -> str:
+        key = self.record.key
+        return f"{key.task.replace('_', ' ')}, level {key.level}, seed {key.seed}"
+
+    @property
+    def outcome(self) -> str:
+        """How it ended, and the type of its failure with the evidence, a paragraph each."""
+        record, failure = self.record, label(self.record)
+        found = END_NAMES[record.end]
+        if record.total:
+            found += f", {record.done} of {record.total} subtasks done"
+        if failure is not None:
+            why = f"{NAMES[failure.kind]}: {failure.evidence}"
+            found += f"\n\n{with_names(why, self.names)}"
+        return found
 
     @property
     def end(self) -> float:
         """Time of the last frame [s]."""
         return self.times[-1]
 
+    @cached_property
+    def moments(self) -> list[Moment]:
+        return moments(self.record, self.names, self.end)
+
     def shown(self, time: float) -> Shown:
         """What is to be seen at `time`: the last frame at or before it, the first one before 0."""
         frame = max(0, bisect_right(self.times, time + 1e-9) - 1)
         happened = sum(moment.time <= time + 1e-9 for moment in self.moments)
         done: dict[int, bool] = {}
-        for when, index, now in self.changes:
-            if when <= time + 1e-9:
-                done[index] = now
+        for event in self.record.events:
+            if event["kind"] in CHANGES and float(event["time"]) <= time + 1e-9:
+                done[int(event["index"])] = event["kind"] == CHANGES[0]
         wanted = frozenset(
             name
             for name, numbers in self.subtasks.items()
             if not all(done.get(number, False) for number in numbers)
         )
         return Shown(self.times[frame], self.frames[frame], happened, wanted)
-
-
-def playback_of(
-    record: TrialRecord,
-    times: Sequence[float],
-    frames: Sequence[Mapping[str, Pose]],
-    names: Mapping[str, str],
-    subtasks: Mapping[str, tuple[int, ...]],
-) -> Playback:
-    """The playback of the trial of `record`, seen at `times` [s] as `frames`."""
-    key = record.key
-    outcome = END_NAMES[record.end]
-    if record.total:
-        outcome += f", {record.done} of {record.total} subtasks done"
-    changes = [
-        (float(event["time"]), int(event["index"]), event["kind"] == "subtask_done")
-        for event in record.events
-        if event["kind"] in ("subtask_done", "subtask_undone")
-    ]
-    failure = label(record)
-    why = f"{NAMES[failure.kind]}: {failure.evidence}" if failure is not None else ""
-    return Playback(
-        f"{key.task.replace('_', ' ')}, level {key.level}, seed {key.seed}",
-        record.instruction,
-        outcome,
-        times,
-        frames,
-        moments(record, names, times[-1]),
-        names,
-        subtasks,
-        changes,
-        with_names(why, names),
-    )
 
 
 def moments(record: TrialRecord, names: Mapping[str, str], end: float) -> list[Moment]:
@@ -313,7 +297,7 @@ def _playback(record: TrialRecord, setup: TrialSetup, seen: PoseRecorder) -> Pla
     roles = setup.tracker.roles
     subtasks = {name: role.subtasks for name, role in roles.items() if role.subtasks}
     names = describe_objects(setup.scene)
-    return playback_of(record, seen.times, seen.frames, names, subtasks)
+    return Playback(record, seen.times, seen.frames, names, subtasks)
 
 
 LISTED = 5
@@ -473,10 +457,8 @@ class Panel:
         self._lock = threading.Lock()
         gui = server.gui
         gui.add_markdown(
-            f"**{_plain(playback.title)}**\n\n{_plain(playback.instruction)}\n\n"
+            f"**{_plain(playback.title)}**\n\n{_plain(playback.record.instruction)}\n\n"
             f"{_plain(playback.outcome)}"
-            + f"\n\n{_plain(playback.failure)}"
-            * bool(playback.failure)
         )
         step = 1 / RATE
         self._time = gui.add_slider(

@@ -34,7 +34,7 @@ from robospa.harness.clock.policy_clock import (
     parse_switching,
     read_latency,
 )
-from robospa.harness.clock.real_time import DECAY, ENTRY, Remaining
+from robospa.harness.clock.real_time import DECAY, ENTRY, Chunk, Remaining
 from robospa.harness.replay import replay
 from robospa.harness.running.record_store import ActionRecorder
 from robospa.harness.server_checks import measure
@@ -179,7 +179,7 @@ def test_rules_are_read(text: str, rule: Switching) -> None:
 def test_waiting_executes_a_chunk_to_its_end_and_no_further_than_the_spec_says() -> None:
     remaining = Remaining(parse_switching("wait"), execute=3)
     assert remaining.wants_query
-    remaining.arrive(0, 0, chunk(10))
+    remaining.arrive(Chunk(0, 0, chunk(10)))
     assert not remaining.wants_query
     assert [taken(remaining) for _ in range(4)] == [10, 11, 12, None]
     assert remaining.wants_query and remaining.executed == 3
@@ -187,41 +187,41 @@ def test_waiting_executes_a_chunk_to_its_end_and_no_further_than_the_spec_says()
 
 def test_what_was_executed_meanwhile_is_left_out_of_a_chunk_that_arrives() -> None:
     remaining = Remaining(parse_switching("after:2"), execute=2)
-    remaining.arrive(0, 0, chunk(10))
+    remaining.arrive(Chunk(0, 0, chunk(10)))
     assert [taken(remaining), remaining.wants_query] == [10, False]
     assert [taken(remaining), remaining.wants_query] == [11, True]
     taken(remaining)  # blind
-    remaining.arrive(1, 2, chunk(20))
+    remaining.arrive(Chunk(1, 2, chunk(20)))
     assert taken(remaining) == 21
 
 
 def test_a_time_in_which_the_robot_held_leaves_out_nothing() -> None:
     remaining = Remaining(parse_switching("arrival"))
     assert [taken(remaining), taken(remaining)] == [None, None]
-    remaining.arrive(0, 0, chunk(10))
+    remaining.arrive(Chunk(0, 0, chunk(10)))
     assert taken(remaining) == 10
 
 
 def test_a_chunk_that_comes_too_late_changes_nothing() -> None:
     remaining = Remaining(parse_switching("after:1"))
-    remaining.arrive(0, 0, chunk(10, 8))
+    remaining.arrive(Chunk(0, 0, chunk(10, 8)))
     for _ in range(5):
         taken(remaining)
-    remaining.arrive(1, 1, chunk(20, 3))
+    remaining.arrive(Chunk(1, 1, chunk(20, 3)))
     assert (remaining.left, taken(remaining)) == (3, 15)
 
 
 def test_an_ensemble_weighs_chunks_by_their_age_as_act_does() -> None:
     remaining = Remaining(parse_switching("ensemble"))
-    remaining.arrive(0, 0, chunk(0))
+    remaining.arrive(Chunk(0, 0, chunk(0)))
     taken(remaining)
-    remaining.arrive(1, 1, chunk(101))
+    remaining.arrive(Chunk(1, 1, chunk(101)))
     action, query = remaining.take() or (None, None)
     old, new = 1.0, 101.0
     expected = (old + new * math.exp(-DECAY)) / (1 + math.exp(-DECAY))
     assert action is not None and action[0] == pytest.approx(expected, abs=2e-5)
     assert query == 1
-    remaining.arrive(2, 2, chunk(202, 2))
+    remaining.arrive(Chunk(2, 2, chunk(202, 2)))
     weights = [1.0, math.exp(-DECAY), math.exp(-2 * DECAY)]
     expected = float(np.average([2.0, 102.0, 202.0], weights=weights))
     assert taken(remaining) == pytest.approx(expected, abs=2e-5)
@@ -230,7 +230,7 @@ def test_an_ensemble_weighs_chunks_by_their_age_as_act_does() -> None:
 def test_committed_are_the_actions_that_are_left() -> None:
     remaining = Remaining(parse_switching("rtc"))
     assert remaining.committed().shape == (0, 0)
-    remaining.arrive(0, 0, chunk(10))
+    remaining.arrive(Chunk(0, 0, chunk(10)))
     taken(remaining)
     assert remaining.committed()[:, 0].tolist() == [11, 12, 13]
 

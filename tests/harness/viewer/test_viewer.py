@@ -46,7 +46,7 @@ def record(success: bool, **changes: object) -> TrialRecord:
 
 
 def played(success: bool = True) -> show.Playback:
-    return show.playback_of(record(success), TIMES, FRAMES, NAMES, SUBTASKS)
+    return show.Playback(record(success), TIMES, FRAMES, NAMES, SUBTASKS)
 
 
 def test_a_time_shows_the_last_frame_at_or_before_it() -> None:
@@ -94,7 +94,7 @@ def test_a_recorded_trial_is_played_again_and_seen(tmp_path: Path) -> None:
     assert [frame["block"].position[2] for frame in played.frames] == list(played.times)
     assert played.times[0] == 0.0
     assert len(played.times) > 1
-    assert played.instruction == record.instruction
+    assert played.record.instruction == record.instruction
 
 
 def test_ten_frames_a_second_are_kept() -> None:
