@@ -16,9 +16,8 @@ from robospa.harness.robots import embodiment
 from robospa.harness.skills.bring_in import dock, hang, put_down, slide_out
 from robospa.harness.skills.motion import go_home
 from robospa.harness.skills.open import pull_open
-from robospa.harness.skills.pick import arms_for, pick
+from robospa.harness.skills.pick import arms_for, pick, raise_lower
 from robospa.harness.skills.place import can_follow, drop, place, place_position, pour
-from robospa.harness.skills.raise_lower import raise_lower
 from robospa.harness.skills.touch import hit, press, stamp
 from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace
 from robospa.tasks import plan as calls

@@ -1,4 +1,4 @@
-"""Grasp candidates of an object: its model's grasps, tilted, tested for reach and neighbours.
+"""Pick and RaiseLower, and the grasps of an object: its model's, tilted, tested for reach and room.
 
 Every candidate is an end-effector pose for one arm. Inverse kinematics runs on all of them at once;
 what is left is ranked by tilt, by room for the fingers and by how far the arm has to go.
@@ -7,6 +7,7 @@ what is left is ranked by tilt, by room for the fingers and by how far the arm h
 import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -23,15 +24,25 @@ from robospa.geometry import (
 )
 from robospa.harness.robots.kinematics import inverse
 from robospa.harness.skills import clearance
-from robospa.harness.skills.motion import go, line_poses, retreat_home, rise, route
+from robospa.harness.skills.motion import (
+    at_once,
+    go,
+    line_poses,
+    retreat_home,
+    rise,
+    route,
+    travel,
+)
 from robospa.harness.skills.workspace import (
     SkillFailed,
+    Steps,
     Workspace,
     max_gripper_y,
     moved_back,
+    moved_up,
     wall_front,
 )
-from robospa.tasks.plan import Pick
+from robospa.tasks.plan import Pick, RaiseLower
 from robospa.tasks.shapes import Box, Cylinder, Grasp, ObjectModel, Shape
 from robospa.tasks.snapshot import Snapshot
 from robospa.workcell import Gripper
@@ -340,3 +351,119 @@ def _same_grasp(a: GraspCandidate, b: GraspCandidate) -> bool:
         math.dist(a.pose.rotation, tuple(-c for c in b.pose.rotation)),
     )
     return a.arm == b.arm and turned < 0.1 and math.dist(a.pose.position, b.pose.position) < 0.01
+
+
+LIFT_ATTEMPTS = 4
+PIECE = 0.034
+"""Two arms lift in pieces no longer than this [m]: both arrive before either goes on."""
+AT_HANDLE = 0.015
+"""A grasp this near to a frame [m] is a grasp of it."""
+LESS = 0.8, 0.6
+"""Shares of the lift and of STANDOFF that do where an arm reaches no farther."""
+SHARE = 0.6
+"""Share of the lift that the object must follow, or the grasp has failed."""
+
+
+def raise_lower(ws: Workspace, call: RaiseLower) -> Steps:
+    """Lift and set down where it was, again and again; SkillFailed if the object does not come
+    along in a few attempts.
+
+    Two arms take the object's "left" and "right" frames and move in the same small steps, so that
+    it stays level. Between the lifts the grippers open where they are.
+    """
+    arms = tuple(ARMS.index(name) for name in call.arms)
+    done, tried = 0, 0
+    while done < call.times:
+        holds = [_plan_lift(ws, call, arm, len(arms) > 1, tried) for arm in arms]
+        yield from _approach(ws, holds)
+        while done < call.times:
+            before = ws.pose(call.object).position[2]
+            _grip(ws, holds, [0.0] * len(holds))
+            ws.add(holds[0][0].arm)
+            for step in zip(*(way_up for _, _, way_up in holds), strict=True):
+                _together(ws, holds, step)
+            yield from ws.flush()
+            followed = ws.pose(call.object).position[2] - before > SHARE * call.rise
+            for step in zip(*([*up[-2::-1], grasp.joints] for grasp, _, up in holds), strict=True):
+                _together(ws, holds, step)
+            _grip(ws, holds, [grasp.opening for grasp, _, _ in holds])
+            yield from ws.flush()
+            if not followed:
+                break
+            done += 1
+        if done < call.times:
+            tried += 1
+            if tried == LIFT_ATTEMPTS:
+                raise SkillFailed(f"{call.object} could not be lifted in {tried} attempts")
+            for grasp, _, _ in holds:
+                rise(ws, grasp.arm)
+            yield from ws.flush()
+    for grasp, _, _ in holds:
+        ws.gripper[grasp.arm] = 1.0
+    _together(ws, holds, [way_in[0] for _, way_in, _ in holds])
+    yield from ws.flush()
+
+
+def _approach(ws: Workspace, holds: Sequence[Choice]) -> Steps:
+    if len(holds) == 1:
+        grasp, way_in, _ = holds[0]
+        go(ws, grasp.arm, way_in[0], grasp.opening)
+    else:
+        set_out = {hold[0].arm: partial(_set_out, ws, hold) for hold in holds}
+        at_once(ws, [set_out[arm] for arm in range(len(ARMS))])
+    for step in zip(*(way_in[1:] for _, way_in, _ in holds), strict=True):
+        _together(ws, holds, step)
+    yield from ws.flush()
+
+
+def _set_out(ws: Workspace, hold: Choice) -> None:
+    grasp, way_in, _ = hold
+    ws.gripper[grasp.arm] = grasp.opening
+    travel(ws, grasp.arm, way_in[0])
+
+
+def _together(ws: Workspace, holds: Sequence[Choice], joints: Sequence[Array]) -> None:
+    for (grasp, _, _), goal in zip(holds, joints, strict=True):
+        ws.joints[grasp.arm] = np.asarray(goal, dtype=float)
+    ws.add(holds[0][0].arm)
+
+
+def _grip(ws: Workspace, holds: Sequence[Choice], openings: Sequence[float]) -> None:
+    for (grasp, _, _), opening in zip(holds, openings, strict=True):
+        ws.gripper[grasp.arm] = opening
+    ws.add(holds[0][0].arm)
+
+
+def _plan_lift(ws: Workspace, call: RaiseLower, arm: int, framed: bool, skip: int) -> Choice:
+    """The best way to take and lift the object, the `skip` best left out.
+
+    What one arm lifts is rather taken by the other, or lifted less high, than taken by a leaning
+    gripper: that turns it, so that it comes down beside its place.
+    """
+    pieces = max(2, math.ceil(call.rise / PIECE)) if framed else 2
+    whole, less = (call.rise, STANDOFF), (LESS[0] * call.rise, LESS[1] * STANDOFF)
+    ways = [(arm, LEVEL, whole), (arm, LEANS, whole)]
+    if not framed:
+        ways[1:1] = [(1 - arm, LEVEL, whole), (arm, LEVEL, less), (1 - arm, LEVEL, less)]
+    for taker, leans, (height, standoff) in ways:
+        for reach in reachable_grasps(ws, call.object, (taker,), leans):
+            if framed and not _at_frame(ws, call.object, ARMS[arm], reach):
+                continue
+            out = moved_back(reach.pose, reach.approach, standoff)
+            back = ws.solve_path(taker, reach.joints, line_poses(reach.pose, out, 2))
+            top = moved_up(reach.pose, height)
+            up = ws.solve_path(taker, reach.joints, line_poses(reach.pose, top, pieces))
+            if back is not None and up is not None:
+                if skip == 0:
+                    return reach, [*back[::-1], reach.joints], up
+                skip -= 1
+    raise SkillFailed(f"the {ARMS[arm]} arm finds no grasp of {call.object} to lift it with")
+
+
+def _at_frame(ws: Workspace, name: str, frame: str, reach: GraspCandidate) -> bool:
+    ahead = ws.hand(reach.arm).grip
+    x, y, z = reach.pose.position
+    dx, dy, dz = reach.approach
+    centre = (x + ahead * dx, y + ahead * dy, z + ahead * dz)
+    handle = ws.pose(name) * ws.models[name].frames[frame]
+    return math.dist(centre, handle.position) < AT_HANDLE

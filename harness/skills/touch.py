@@ -233,21 +233,17 @@ def _fitting(ws: Workspace, call: Hit, names: list[str]) -> grasping.GraspFilter
     return lambda grasp: ways(grasp, tips) >= best
 
 
-def _targets(ws: Workspace, tool: str, name: str, tips: tuple[float, ...]) -> list[Pose]:
-    """Poses of the tool, tipped by `tips`, whose head is on the object, from all sides."""
+def _spots(
+    ws: Workspace, arm: int, offset: Pose, tool: str, name: str, tips: tuple[float, ...]
+) -> list[placing.Placement]:
+    """Ways to bring the tool's head onto the object, from all sides, tipped by `tips`."""
     x, y, z = (ws.pose(name) * ws.models[name].frames["press"]).position
     head = ws.models[tool].frames["head"].inverse()
-    return [
+    targets = [
         Pose((x, y, z - HIT_DEPTH + FACE * abs(math.sin(tip))), yaw_rotation(yaw))
         * Pose((0.0, 0.0, 0.0), axis_rotation((1.0, 0.0, 0.0), tip))
         * head
         for tip in tips
         for yaw in placing.YAWS
     ]
-
-
-def _spots(
-    ws: Workspace, arm: int, offset: Pose, tool: str, name: str, tips: tuple[float, ...]
-) -> list[placing.Placement]:
-    targets = _targets(ws, tool, name, tips)
     return placing.reachable_placements(ws, arm, offset, targets, ABOVE, ws.joints[arm])

@@ -21,9 +21,9 @@ import numpy as np
 from robospa.geometry import Pose, yaw_rotation
 from robospa.tasks import objects
 from robospa.tasks.colors import NAMED
-from robospa.tasks.families import click_order, table
+from robospa.tasks.families import in_order, table
 from robospa.tasks.families.chain import pressing_arm
-from robospa.tasks.goals.clicks import PressCounts
+from robospa.tasks.goals.checklist import PressCounts
 from robospa.tasks.goals.conditions import Region
 from robospa.tasks.goals.memory import AfterCue, Cover, OrientationTarget, restore, uncover
 from robospa.tasks.goals.placing import gather
@@ -187,9 +187,9 @@ class ObjectsFacts(SceneFacts):
 
 def _draw_objects(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     kinds = shuffled(rng, KINDS)[:level]
-    things = [(kind, click_order.clickable(rng, kind)) for kind in kinds]
-    turns = dict.fromkeys(click_order.TURNS, math.pi)
-    places = click_order.laid_out(rng, workcell, TABLE_AREA, OFF_MIDDLE, APART, things, turns)
+    things = [(kind, in_order.clickable(rng, kind)) for kind in kinds]
+    turns = dict.fromkeys(in_order.TURNS, math.pi)
+    places = in_order.laid_out(rng, workcell, TABLE_AREA, OFF_MIDDLE, APART, things, turns)
     items = [wall(0.05, 0.32), OBJECTS_STAND]
     for (kind, variant), x, place in zip(things, row(level, SHOWN_X), places, strict=True):
         turn = rng.uniform(-SHOWN_TURN, SHOWN_TURN) if kind == "bread" else 0.0
@@ -205,7 +205,7 @@ def _objects_goal(scene: Scene) -> AfterCue:
     One that is touched when its turn comes is clicked (official).
     """
     facts = ObjectsFacts.of(scene)
-    return AfterCue(click_order.in_order(scene, facts.order, standing=True), [facts.wall])
+    return AfterCue(in_order.in_order(scene, facts.order, standing=True), [facts.wall])
 
 
 def _objects_slots(scene: Scene) -> Slots:
@@ -219,7 +219,7 @@ OBJECTS = Task(
     levels=levels(candidates=1),
     draw=_draw_objects,
     goal=_objects_goal,
-    plan=lambda scene: (HOLD_STILL, *click_order.clicks(scene, ObjectsFacts.of(scene).order)),
+    plan=lambda scene: (HOLD_STILL, *in_order.clicks(scene, ObjectsFacts.of(scene).order)),
     templates=OBJECTS_TEXT.templates,
     slots=_objects_slots,
     summary="Remember the row of objects shown and click the same ones in that order.",

@@ -171,30 +171,19 @@ COLOR = _task(
 )
 
 
-@dataclass(frozen=True)
-class Scale:
-    """What is compared: its two ends for two blocks and for more, and other words held out."""
-
-    two: tuple[str, str]
-    more: tuple[str, str]
-    held_two: tuple[str, str]
-    held_more: tuple[str, str]
-
-
-SIZES = Scale(
-    ("larger", "smaller"), ("largest", "smallest"), ("bigger", "smaller"), ("biggest", "smallest")
+SIZES = (
+    ("larger", "smaller", "bigger", "smaller"),
+    ("largest", "smallest", "biggest", "smallest"),
 )
-LENGTHS = Scale(
-    ("longer", "shorter"), ("longest", "shortest"), ("longer", "shorter"), ("longest", "shortest")
-)
+LENGTHS = ("longer", "shorter") * 2, ("longest", "shortest") * 2
+"""The two ends of what is compared and other words for them, held out: for two blocks, for more."""
 
 
-def _tower_slots(scale: Scale, scene: Scene) -> Slots:
+def _tower_slots(words: Sequence[Sequence[str]], scene: Scene) -> Slots:
     count = len(TowerFacts.of(scene).order)
     if count == 1:
         return TEXT.slots("block") | {"middle": COMMON.phrasings("middle.near")}
-    most, least = scale.two if count == 2 else scale.more
-    held_most, held_least = scale.held_two if count == 2 else scale.held_more
+    most, least, held_most, held_least = words[0 if count == 2 else 1]
     more, less = (f"{word.removesuffix('st')}r" for word in (most, least))
     some = by_count(count)
     order = TEXT.phrasings(

@@ -10,7 +10,7 @@ from robospa.geometry import Array, Pose
 from robospa.harness.robots import Embodiment, embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills.motion import at_once, go, go_home, travel
-from robospa.harness.skills.raise_lower import raise_lower
+from robospa.harness.skills.pick import raise_lower
 from robospa.harness.skills.workspace import SkillFailed, Workspace, fewer_waypoints
 from robospa.tasks.plan import RaiseLower
 from robospa.tasks.scene import Scene, SceneObject

@@ -8,8 +8,13 @@ from snapshots_by_hand import AWAY, TICK, held, kinds, play, snap
 from robospa.geometry import Pose, Vec3
 from robospa.tasks.events import outcome
 from robospa.tasks.goals import counters, memory
-from robospa.tasks.goals.checklist import CHAIN, Checklist, by_turns
-from robospa.tasks.goals.clicks import ClickInOrder, PressCounts
+from robospa.tasks.goals.checklist import (
+    CHAIN,
+    Checklist,
+    ClickInOrder,
+    PressCounts,
+    by_turns,
+)
 from robospa.tasks.goals.conditions import Container, Inside, Region, Rests, level_with, on_spot
 from robospa.tasks.goals.counters import PressCounter
 from robospa.tasks.goals.placing import collect, gather, nest, row, stack
