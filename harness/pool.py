@@ -85,7 +85,6 @@ class Child:
         return f"signal {-code}" if code < 0 else f"exit code {code}"
 
     def kill(self) -> None:
-        """End it now."""
         self._process.kill()
         self._process.wait()
 
@@ -178,7 +177,6 @@ class JobProcess(Generic[J, R]):
         self.pid = self._child.pid
 
     def run(self, job: J) -> R:
-        """What comes of `job`; raises WorkerDied, and what the job raised."""
         (pipe,) = self._child.pipes
         try:
             pipe.send(job)
@@ -195,7 +193,6 @@ class JobProcess(Generic[J, R]):
         return result
 
     def kill(self) -> None:
-        """End it now."""
         self._child.kill()
 
 
@@ -281,7 +278,6 @@ class Pool(Generic[J, R]):
             thread.join()
 
     def submit(self, job: J) -> Future[R]:
-        """What comes of `job`, in a while."""
         future: Future[R] = Future()
         self._waiting.put((job, future))
         return future

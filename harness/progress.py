@@ -78,7 +78,6 @@ class Bar:
         return True
 
     def note(self, text: str) -> None:
-        """One line of news."""
         if self._screen is not None:
             self._screen.note(text)
         else:
@@ -172,7 +171,6 @@ class Progress(Bar):
         return self
 
     def add(self, record: TrialRecord) -> None:
-        """Count one finished or lost trial."""
         if not self.ran:
             self._line = float("-inf")  # the first result is shown at once
         self.ran += 1

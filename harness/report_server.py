@@ -147,7 +147,6 @@ class ReportServer(ThreadingHTTPServer):
 
     @property
     def address(self) -> str:
-        """The URL of the page."""
         return f"http://127.0.0.1:{self.server_port}/"
 
     def process_request(self, request: Request, client_address: object) -> None:
@@ -197,7 +196,6 @@ class _Handler(BaseHTTPRequestHandler):
         self._send_head(HTTPStatus.SEE_OTHER, "text/plain", 0, Location=address)
 
     def do_GET(self) -> None:
-        """The page or a video."""
         if not self._is_ours("Host"):
             return
         path = unquote(self.path.partition("?")[0])

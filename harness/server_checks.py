@@ -13,8 +13,10 @@ observations of the form that the policy asks for.
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass
+from itertools import chain
 
 from robospa.extras import remedy
 from robospa.harness.clock.policy_clock import Latency, of_samples
@@ -157,34 +159,27 @@ def measure(
 
 def _load(connect: Callable[[], RemotePolicy], count: int, seconds: float) -> Load:
     ready = threading.Barrier(count)
-    times: list[float] = []
-    spans: list[tuple[float, float]] = []
-    errors: list[BaseException] = []
 
-    def ask() -> None:
+    def ask(_: int) -> tuple[float, list[float], float]:
         try:
             with connect() as policy:
                 policy.reset(trial_for(policy.spec))
                 policy.infer(synthetic_observation(policy.spec))
                 ready.wait()
                 began = time.perf_counter()
-                own = _times(policy, began + seconds)
-                spans.append((began, time.perf_counter()))
-                times.extend(own)
-        except BaseException as error:  # raised again in the caller's thread
-            errors.append(error)
+                return began, _times(policy, began + seconds), time.perf_counter()
+        except BaseException:
             ready.abort()
+            raise
 
-    threads = [threading.Thread(target=ask) for _ in range(count)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    real = [error for error in errors if not isinstance(error, threading.BrokenBarrierError)]
-    if errors:
-        raise real[0] if real else errors[0]
-    took = max(end for _, end in spans) - min(start for start, _ in spans)
-    return Load(count, tuple(sorted(times)), len(times) / took)
+    with ThreadPoolExecutor(count) as pool:
+        asking = [pool.submit(ask, number) for number in range(count)]
+    errors = [error for one in asking if (error := one.exception()) is not None]
+    if errors:  # that of a client, rather than that others then wait for it in vain
+        raise min(errors, key=lambda error: isinstance(error, threading.BrokenBarrierError))
+    starts, times, ends = zip(*(one.result() for one in asking), strict=True)
+    every = sorted(chain(*times))
+    return Load(count, tuple(every), len(every) / (max(ends) - min(starts)))
 
 
 def _times(policy: RemotePolicy, until: float) -> list[float]:

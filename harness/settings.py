@@ -220,7 +220,6 @@ class Recording:
 
     @property
     def cameras(self) -> tuple[str, ...]:
-        """The names in `video_cameras`."""
         return tuple(self.video_cameras.split(","))
 
     def __post_init__(self) -> None:

@@ -255,20 +255,13 @@ def target_of(
     from robospa.protocol.transport import Timeouts
 
     limits = Timeouts(wait=wait, hello=timeout, reset=timeout, first_infer=timeout, infer=timeout)
-
     try:
         dialect = find_endpoint(url).dialect
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     options = client_options(url, client)
     connector = partial(connect, url, token, limits, options=options)
-    return Target(
-        url.partition("?")[0],
-        token,
-        limits,
-        connector,
-        dialect,
-    )
+    return Target(url.partition("?")[0], token, limits, connector, dialect)
 
 
 def _episode(demo: Path, instruction: str | None) -> Episode:

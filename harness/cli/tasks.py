@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import asdict, fields
 from itertools import pairwise
 from pathlib import Path
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from robospa.harness.sim.sapien_world import SapienWorld
     from robospa.tasks.scene import Scene, SceneObject
     from robospa.tasks.task import Task
 
@@ -250,22 +252,29 @@ def _object_line(item: SceneObject) -> str:
     return f"{item.name}: {item.asset} at {_plain(item.pose.position)}{fixed}{late}"
 
 
+@contextmanager
+def _drawing(console: Console, what: str) -> Iterator[SapienWorld]:
+    """A simulator to draw with; what goes wrong with `what` is printed and ends with 1."""
+    from rich.text import Text
+
+    from robospa.harness.sim.sapien_world import SapienWorld
+    from robospa.harness.world import RenderUnavailable, SceneUnstable
+
+    with closing(SapienWorld()) as world:
+        try:
+            yield world
+        except (RenderUnavailable, SceneUnstable, OSError, ValueError) as error:
+            console.print(Text.assemble((f"no {what}:", "red"), f" {error}"))
+            raise typer.Exit(1) from None
+
+
 def _draw(console: Console, scene: Scene, camera: str, size: tuple[int, int], path: Path) -> None:
     from rich.text import Text
 
     from robospa.harness.pictures import gallery
-    from robospa.harness.sim.sapien_world import SapienWorld
-    from robospa.harness.world import RenderUnavailable, SceneUnstable
 
-    world = SapienWorld()
-    try:
-        image = gallery.first_frame(world, scene, camera, size)
-        gallery.save(image, path)
-    except (RenderUnavailable, SceneUnstable, OSError) as error:
-        console.print(Text.assemble(("no picture:", "red"), f" {error}"))
-        raise typer.Exit(1) from None
-    finally:
-        world.close()
+    with _drawing(console, "picture") as world:
+        gallery.save(gallery.first_frame(world, scene, camera, size), path)
     console.print(Text.assemble(("first frame", "bold"), f"  {path}"), soft_wrap=True)
 
 
@@ -284,11 +293,8 @@ def _gallery(
     console: Console, chosen: list[Task], seed: int, split: str, world: str | None, path: Path
 ) -> None:
     from rich.progress import track
-    from rich.text import Text
 
     from robospa.harness.pictures import gallery
-    from robospa.harness.sim.sapien_world import SapienWorld
-    from robospa.harness.world import RenderUnavailable, SceneUnstable
     from robospa.tasks.catalog import build_scene
     from robospa.tasks.sentences import instruction
 
@@ -304,8 +310,7 @@ def _gallery(
     def sentence(scene: Scene) -> str:
         return instruction(told[scene.digest], split)
 
-    simulator = SapienWorld()
-    try:
+    with _drawing(console, "gallery") as simulator:
         rows = [
             gallery.task_row(simulator, task, seed, sentence, build)
             for task in track(chosen, "drawing", console=console)
@@ -313,11 +318,6 @@ def _gallery(
         count = sum(len(row.cells) for row in rows)
         page = gallery.sheet(rows, f"RoboSPA · {len(rows)} tasks, {count} variants, seed {seed}")
         gallery.save(page, path)
-    except (RenderUnavailable, SceneUnstable, OSError, ValueError) as error:
-        console.print(Text.assemble(("no gallery:", "red"), f" {error}"))
-        raise typer.Exit(1) from None
-    finally:
-        simulator.close()
     console.print(f"{count} variants in {path}", soft_wrap=True)
 
 

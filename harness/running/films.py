@@ -133,7 +133,6 @@ def film_maker(argument: tuple[WorkerConfig, str]) -> Callable[[TrialRecord], Fi
 
 
 def film_process(config: WorkerConfig, name: str, nice: int) -> JobWorker[TrialRecord, FilmDone]:
-    """A process of that name that makes films."""
     return JobProcess(film_maker, (config, name), seconds=LONGEST, name=name, nice=nice)
 
 
@@ -163,7 +162,6 @@ class Films:
 
     @property
     def pending(self) -> int:
-        """Films that are waiting or being made."""
         return len(self._jobs)
 
     def add(self, records: Iterable[TrialRecord], there: Container[str] = ()) -> None:

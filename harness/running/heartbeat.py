@@ -64,12 +64,10 @@ class HeartbeatSender:
         return Heartbeat(self.count, self.activity, self.answers, self.answer_ms)
 
     def answered(self, seconds: float) -> None:
-        """A policy has answered an observation after `seconds`."""
         self.answers += 1
         self.answer_ms = 1000.0 * seconds
 
     def advance(self, *_: object) -> None:
-        """Something has advanced."""
         self.count += 1
 
     @contextmanager
@@ -132,7 +130,6 @@ class MonitoredPolicy:
 
     @property
     def spec(self) -> PolicySpec:
-        """The policy's."""
         return self._policy.spec
 
     @property
@@ -146,11 +143,9 @@ class MonitoredPolicy:
         return self._policy.last_timing if has(self._policy, "last_timing") else {}
 
     def begin(self) -> None:
-        """Another trial follows."""
         self.in_trial = self.failed = False
 
     def reset(self, trial: TrialInfo) -> None:
-        """Begin a trial."""
         with self._heartbeat.policy(self.target):
             self._announce()
             self.in_trial = True
@@ -190,19 +185,16 @@ class MonitoredPolicy:
             raise PolicyError(error_sentence(error)) from error
 
     def end(self, outcome: Mapping[str, Any]) -> None:
-        """Tell the policy how its trial went, if it wants to know."""
         if has(self._policy, "end"):
             with self._heartbeat.policy(self.target):
                 self._policy.end(outcome)
 
     def reconnect(self) -> None:
-        """Open a new connection to the policy's server, if it has one."""
         if has(self._policy, "reconnect"):
             with self._heartbeat.policy(self.target):
                 self._policy.reconnect()
 
     def close(self) -> None:
-        """Free what the policy holds."""
         if has(self._policy, "close"):
             with self._heartbeat.policy(self.target):
                 self._policy.close()
@@ -219,7 +211,6 @@ class HeartbeatMonitor:
         self._activity: Activity = "simulating"
 
     def receive(self, beat: Heartbeat, now: float) -> None:
-        """The worker has sent `beat`."""
         if beat.progress != self._count or beat.activity == "waiting":
             self._since = now
         self._count, self._activity = beat.progress, beat.activity

@@ -66,7 +66,6 @@ def git_state(folder: Path) -> GitState | None:
 
 
 def this_processor() -> Processor:
-    """The kind of processor of this machine."""
     try:
         rows = Path("/proc/cpuinfo").read_text().partition("\n\n")[0].splitlines()
     except OSError:
@@ -121,13 +120,6 @@ def _plain(value: object) -> object:
     return json.loads(json.dumps(to_builtins(value), default=str))
 
 
-def _list_changes(old: RunManifest, new: RunManifest) -> list[str]:
-    before, after = set(old.keys), set(new.keys)
-    if before == after:
-        return []
-    return [f"trials: {len(after - before)} new and {len(before - after)} gone"]
-
-
 def changed_policies(old: RunAbout, new: RunAbout) -> list[str]:
     """One phrase per policy that is another one in `new`: which, and how it greets otherwise. A
     server at a new address must be who the first one was."""
@@ -148,7 +140,6 @@ def _identity(server: ServerFacts) -> Identity:
 
 
 def write_manifest(folder: Path, manifest: RunManifest) -> None:
-    """Write `run.json` at once or not at all."""
     replace_file(folder / MANIFEST, manifest_text(manifest).encode())
 
 
@@ -216,7 +207,10 @@ def open_run(
         return
     old = read_manifest(folder)
     settings = _allowed_changes(old.settings, manifest.settings, tasks)
-    changes = changed_settings(settings, manifest.settings) + _list_changes(old, manifest)
+    changes = changed_settings(settings, manifest.settings)
+    gone, new = set(old.keys) - set(manifest.keys), set(manifest.keys) - set(old.keys)
+    if gone or new:
+        changes.append(f"trials: {len(new)} new and {len(gone)} gone")
     for part in ("versions", "code"):
         before, now = getattr(old.about, part), getattr(manifest.about, part)
         changes += changed_settings({part: before}, {part: now})

@@ -138,11 +138,9 @@ class RayExecutor(Executor):
             raise
 
     def nodes(self) -> list[str]:
-        """Addresses of the cluster's nodes."""
         return sorted(set(self._addresses.values()))
 
     def capacity(self) -> int:
-        """How many workers fit into the cluster now."""
         return min(sum(self._slots.values()), self._settings.workers or sys.maxsize)
 
     def start(self, name: str) -> RayWorker:
@@ -392,7 +390,10 @@ def check_address(address: str) -> None:
     if address == "local":
         return
     if address == "auto":
-        last = _last_cluster()
+        written = Path(os.environ.get("RAY_TMPDIR", "/tmp")) / "ray" / "ray_current_cluster"
+        last = os.environ.get("RAY_ADDRESS", "")
+        with suppress(OSError):
+            last = last or written.read_text().strip()
         if reason := unreachable(last):
             raise NoCluster(f"{NONE_HERE} (the last one was at {last}: {reason})")
         return
@@ -405,14 +406,6 @@ def check_address(address: str) -> None:
         raise NoCluster(
             f"no Ray cluster answers at {address} ({reason}); `ray start --head` starts one"
         )
-
-
-def _last_cluster() -> str:
-    written = Path(os.environ.get("RAY_TMPDIR", "/tmp")) / "ray" / "ray_current_cluster"
-    try:
-        return os.environ.get("RAY_ADDRESS") or written.read_text().strip()
-    except OSError:
-        return ""
 
 
 def unreachable(address: str) -> str:
@@ -494,7 +487,6 @@ class WorkerActor:
         return ""
 
     def send(self, command: Command) -> None:
-        """Pass `command` on to the worker."""
         self._worker.send(command)
 
     def report(self, seconds: float) -> WorkerReport:
@@ -513,7 +505,6 @@ class WorkerActor:
         return WorkerReport((*beats[-1:], *others), files, self._new_output(), exit_status)
 
     def close(self) -> None:
-        """End the worker and remove its folder."""
         self._worker.kill()
         self._folder.cleanup()
 

@@ -159,11 +159,9 @@ class ActionRecorder:
         return np.stack(self._joints) if self._joints else None
 
     def started(self, world: World) -> None:
-        """Nothing has been executed yet."""
         self._on_step()
 
     def polled(self, world: World, time: float) -> None:
-        """An action is being executed."""
         self._on_step()
 
     def executed(self, world: World, action: NDArray[np.float32], done: StepResult) -> None:

@@ -31,6 +31,7 @@ from robospa.protocol.errors import printable
 from robospa.registry import UnknownName
 from robospa.results.records.manifest import MANIFEST
 from robospa.results.records.runs import read_run
+from robospa.tasks.catalog import tasks
 from robospa.trial import TrialKey
 
 HELD = 3
@@ -66,7 +67,10 @@ def make_request(
     kind.check(settings)
     trials = list_trials(settings.selection) if keys is None else keys
     servers = check_servers(settings)
-    policies = _policy_map(settings.policy_map, trials)
+    policies: dict[str, Targets] = {}
+    if settings.policy_map is not None:
+        asked = list(dict.fromkeys(key.task for key in trials))
+        policies = read_map(settings.policy_map, asked, tasks())
     found = [*servers, *(t for ts in policies.values() for t in each(ts))]
     folder = run_folder(settings, resume)
     options = connect_arguments(found, settings.connection, token)
@@ -200,14 +204,6 @@ def client_options(url: str, file: Path | None) -> dict[str, Any]:
         text = printable(str(getattr(error, "strerror", None) or error), 600)
         raise SettingsError(f"{where}{text}") from error
     return given
-
-
-def _policy_map(file: Path | None, keys: Sequence[TrialKey]) -> dict[str, Targets]:
-    if file is None:
-        return {}
-    from robospa.tasks.catalog import tasks
-
-    return read_map(file, list(dict.fromkeys(key.task for key in keys)), tasks())
 
 
 def _clock(settings: EvaluationSettings) -> PolicyClock | None:

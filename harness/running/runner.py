@@ -463,7 +463,6 @@ class Runner:
             self.on_status(self.status(now))
 
     def status(self, now: float) -> Status:
-        """The state of the run at time `now`."""
         queue, local = self._queue, self.executor is None
         ready = [slot for slot in self._slots if slot.ready]
         workers = [slot for slot in self._slots if not slot.extra]

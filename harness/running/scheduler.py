@@ -124,7 +124,6 @@ class Scheduler:
         return max(free or mine, key=lambda task: due[task])
 
     def done(self, job: TrialJob, record: TrialRecord, now: float, seconds: float) -> None:
-        """`job` has its record at time `now`, after `seconds`."""
         self.servers[job.target].finish_trial(record, now)
         self.queue.durations.add(record.key, seconds)
 
@@ -199,7 +198,6 @@ class DurationEstimates:
         return self._limits > 0
 
     def add(self, key: TrialKey, seconds: float) -> None:
-        """A trial of the variant of `key` took `seconds`."""
         total, count = self._measured.get(key.variant, (0.0, 0))
         self._measured[key.variant] = (total + seconds, count + 1)
         self._seconds += seconds
@@ -259,7 +257,6 @@ class TrialQueue:
 
     @property
     def tasks(self) -> tuple[str, ...]:
-        """Every base task of the run."""
         return tuple(self._groups)
 
     def due(self, now: float) -> dict[str, float]:

@@ -37,7 +37,6 @@ class TimeBreakdown:
     whole: dict[str, float] = field(default_factory=dict)
 
     def add(self, record: TrialRecord) -> None:
-        """Count one trial that was run."""
         spent = {
             name: sum(record.timing.get(part, 0.0) for part in parts)
             for name, parts in PURPOSES.items()
@@ -52,7 +51,6 @@ class TimeBreakdown:
         return _shares(self.recent)
 
     def overall_shares(self) -> dict[str, float]:
-        """Shares of all trials."""
         return _shares([self.whole])
 
 
@@ -229,7 +227,6 @@ class ServerStats:
         return not self.failures and not self.excluded
 
     def start_trial(self, task: str, now: float) -> None:
-        """A trial of `task` is sent there."""
         self.wait_per_worker = self.wait(now)
         self.switches += self.task not in ("", task)
         self.task = task
@@ -241,7 +238,6 @@ class ServerStats:
         self.answer_ms = update_mean(self.answer_ms, ms)
 
     def finish_trial(self, record: TrialRecord, now: float) -> None:
-        """A trial there has its record."""
         sharing, self.idle_since = max(1, self.running), now
         self.running -= 1
         self.trials += 1
@@ -289,7 +285,6 @@ class ServerStats:
 
 
 def update_mean(old: float | None, new: float) -> float:
-    """The running mean `old` after `new`."""
     return new if old is None else old + SMOOTHING * (new - old)
 
 
@@ -390,7 +385,6 @@ class Autoscaler:
     _trials: int = 0
 
     def add(self, record: TrialRecord) -> None:
-        """Count one trial that was run."""
         self._seconds += record.wall_time
         self._busy += record.timing.get(PROCESSOR, 0.0)
         self._trials += 1

@@ -83,15 +83,12 @@ class CarefulTracker:
         self._tracker, self._say = tracker, say
 
     def add(self, record: TrialRecord) -> None:
-        """A trial has its record."""
         self._try(lambda tracker: tracker.add(record))
 
     def finish(self, folder: Path) -> None:
-        """All trials of the run in `folder` have been run."""
         self._try(lambda tracker: tracker.finish(read_run(folder)))
 
     def close(self) -> None:
-        """Nothing else comes, whether the run has ended or was stopped."""
         self._try(WandbTracker.close)
 
     def _try(self, call: Callable[[WandbTracker], None]) -> None:

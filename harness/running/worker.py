@@ -54,7 +54,6 @@ gets the interpreter several times for each."""
 
 
 def each(targets: Targets) -> tuple[str, ...]:
-    """One by one."""
     return (targets,) if isinstance(targets, str) else tuple(targets)
 
 
@@ -107,7 +106,6 @@ class WorkerConfig:
     clock: PolicyClock | None = None
 
     def targets(self, task: str) -> tuple[str, ...]:
-        """URLs or names of the policies that can do `task`."""
         return each(self.policies[task] if self.policies else self.policy)
 
     @property
@@ -238,7 +236,6 @@ class Worker:
             world.close()
 
     def close(self) -> None:
-        """Close the connection to the policy's server and free the world."""
         for part in (self._policy, self._world):
             if part is not None:
                 part.close()
@@ -401,7 +398,6 @@ class LocalExecutor(executor.Executor):
         return self.workers
 
     def start(self, name: str) -> LocalWorker:
-        """Start one more process."""
         process = Child(main, (self._config, name), name, pipes=self._concurrent_trials)
         first, *spare = process.pipes
         return LocalWorker(process, first, name, spare)
