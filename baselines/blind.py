@@ -115,14 +115,13 @@ def _nearest_first(scene: Scene, ws: Workspace) -> list[SceneObject]:
 
 @dataclass(frozen=True)
 class Habit:
-    """What a plan does with a thing of `kind` = (asset, right of the middle): it comes `rank`-th.
+    """What a plan does with a thing of `kind` = (asset, right of the middle).
 
     Objects in `calls` are named by their assets, the thing itself is "". `sort` is the same with
     places rounded.
     """
 
     kind: tuple[str, bool]
-    rank: int
     calls: tuple[Skill, ...]
     sort: tuple[Skill, ...]
 
@@ -139,9 +138,9 @@ def commonest(scene: Scene, ws: Workspace) -> list[Skill]:
     for habits in alike:
         for asset in set(seen):
             numbers[asset][sum(habit.kind[0] == asset for habit in habits)] += 1
-        for habit in habits:
+        for rank, habit in enumerate(habits):
             sorts[habit.kind][habit.sort] += 1
-            ranks[habit.kind[0]].append(habit.rank)
+            ranks[habit.kind[0]].append(rank)
     things = [o for o in _nearest_first(scene, ws) if o.asset in ranks]
     things.sort(key=lambda o: sum(ranks[o.asset]) / len(ranks[o.asset]))
     left = {asset: count.most_common(1)[0][0] for asset, count in numbers.items()}
@@ -175,22 +174,21 @@ def _training(name: str) -> list[tuple[list[str], list[Habit]]]:
 
 
 def _habits(scene: Scene) -> list[Habit]:
-    """The plan of a training scene, thing by thing."""
+    """The plan of a training scene, thing by thing in its order."""
     by_thing: dict[str, list[Skill]] = {}
     for call in task(scene.task).plan(scene):
         if not isinstance(call, Wait | Home):
             actor = call.tool if isinstance(call, Hit) else call.object
             by_thing.setdefault(actor, []).append(call)
-    return [_habit(scene, rank, *entry) for rank, entry in enumerate(by_thing.items())]
-
-
-def _habit(scene: Scene, rank: int, name: str, calls: Sequence[Skill]) -> Habit:
-    item = scene.object(name)
-    base = scene.table_top - object_model(item.asset, item.params).bottom
-    names = {o.name: o.asset for o in scene.objects} | {name: ""}
-    plain = tuple(_named(call, names.__getitem__, -base) for call in calls)
-    kind = (item.asset, item.pose.position[0] > 0)
-    return Habit(kind, rank, plain, tuple(_rounded(call) for call in plain))
+    found = []
+    for name, calls in by_thing.items():
+        item = scene.object(name)
+        base = scene.table_top - object_model(item.asset, item.params).bottom
+        names = {o.name: o.asset for o in scene.objects} | {name: ""}
+        plain = tuple(_named(call, names.__getitem__, -base) for call in calls)
+        kind = (item.asset, item.pose.position[0] > 0)
+        found.append(Habit(kind, plain, tuple(map(_rounded, plain))))
+    return found
 
 
 def _named(call: Skill, name: Callable[[str], str], rise: float) -> Skill:

@@ -3,7 +3,6 @@
 If a variant's claimed and fresh trials have one success rate, then, given how many of them all
 succeeded, the number of fresh successes is hypergeometric: Fisher's exact test. The sum over
 variants, whose rates may all differ, is the convolution of these distributions, computed in full.
-Nothing is estimated or approximated; a variant in which all or none succeed counts for nothing.
 The whole is tested, and every cell that a table can be sorted by, corrected after Holm: a lie about
 one variant of 280 is lost in the whole.
 """

@@ -1,10 +1,8 @@
 """What a submission bundle is: a zip file of known names, sizes and hashes, and nothing else.
 
-Names are matched against the list in docs/leaderboard.md, sizes are bounded before a byte is read,
-and nothing in a bundle is ever extracted, imported or run.
-
-The zip is looked at whole before a byte is unpacked, so that no two readers see two archives. JSON
-of strangers is finite numbers, no repeated fields, and text that is only text, without markup.
+Nothing in a bundle is ever extracted, imported or run. The zip is looked at whole before a byte is
+unpacked, so that no two readers see two archives. JSON of strangers is finite numbers, no repeated
+fields, and text without markup.
 """
 
 from __future__ import annotations

@@ -1,14 +1,12 @@
 """The model card: who made what was evaluated, from which data, and where its weights are.
 
-Weights are at a https address, or remade by a script of this repository ("recipe:scripts/x.sh").
-Written as TOML (`robospa submit template`), which Python reads without a further dependency; kept
-in the bundle as JSON. Every field is required, of one type, of bounded length, and plain text:
-markup, scripts and invisible characters are refused, since names end up on a page.
+Written as TOML (`robospa submit template`), kept in the bundle as JSON. Weights are at a https
+address, or remade by a script of this repository ("recipe:scripts/x.sh"). Markup, scripts and
+invisible characters are refused, since names end up on a page.
 
-Names of the paper's models and team are taken, however they are spelt. They are compared by their
-skeleton: without case, accents, spaces and punctuation, with characters that look alike as one. So
-"Pi-0.5", "π0.5" and a name with a Cyrillic letter in it are all the model of the paper. A name that
-says more, such as "pi0.5 (our lab)", is free.
+Names of the paper's models and team are taken, however they are spelt: they are compared by their
+skeleton, without case, accents, spaces and punctuation, with characters that look alike as one. A
+name that says more, such as "pi0.5 (our lab)", is free.
 """
 
 import re

@@ -1,9 +1,8 @@
 """Who stands on the leaderboard: submissions with their badges, and the four published models.
 
-An entry's values come from the outcomes of its trials; all averages are computed here, and a
-submission whose own scores differ from them is refused. Two entries of one `Group` are ranked
-against each other in the cells that are in the `ranks` of both. What an entry does not state equals
-nothing.
+An entry's values come from the outcomes of its trials; a submission whose own scores differ from
+them is refused. Two entries of one `Group` are ranked against each other in the cells that are in
+the `ranks` of both.
 """
 
 from __future__ import annotations
@@ -302,15 +301,11 @@ def _shown(column: Column, metric: str, row: str, level: int) -> list[float] | i
 
 
 def all_entries(submissions: Sequence[Submission]) -> list[Entry]:
-    """Submissions and published models; BundleError if two have one name or the same trials."""
+    """Submissions and published models; BundleError if two are of the same trials."""
     owner: dict[str, Submission] = {}
     for one in submissions:
         if (first := owner.setdefault(one.rows, one)) is not one:
             raise BundleError(
                 f"the submissions {first.folder.name} and {one.folder.name} are of the same trials"
             )
-    made = [*map(entry_of, submissions), *published_entries()]
-    slugs = [entry.slug for entry in made]
-    if twice := sorted({s for s in slugs if slugs.count(s) > 1}):
-        raise BundleError(f"two entries are called {twice[0]}; rename the submission's folder")
-    return made
+    return [*map(entry_of, submissions), *published_entries()]

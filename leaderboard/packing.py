@@ -1,10 +1,8 @@
 """From runs to a bundle: what may not enter is refused, the rest written, verified and named.
 
-The rules are those of verifying (`verify.check_run`); besides, runs that were made with different
-versions, code or settings are no bundle, and trials have to be complete.
-
-The announced trials are filmed by playing their recorded actions again; a film that the run has
-already is taken as it is. Addresses and command lines stay at home.
+The rules are those of verifying (`verify.check_run`); besides, runs have to be complete and made
+alike. The announced trials are filmed by playing their recorded actions again, unless the run has
+the film already. Addresses and command lines stay at home.
 """
 
 import os
@@ -83,11 +81,11 @@ def pack(
         homes = {key: one.folder for one in parts[path] for key in one.keys}
         part = path.with_name(f".{path.name}.{os.getpid()}.part")
         try:
-            chosen = announced(reference.suite, run.keys) if videos else []
+            chosen = announced(run.manifest.suite, run.keys) if videos else []
             films = _films(run, chosen, reference, homes, note)
             note("writing the bundle")
             trace = partial(_trace, homes)
-            write_bundle(part, run, card, reference.suite, trace, films, practice)
+            write_bundle(part, run, card, trace, films, practice)
             note("verifying what was packed")
             valid = verify(part, reference, practice, done=done)
             part.replace(path)
@@ -179,7 +177,6 @@ def write_bundle(
     path: Path,
     run: Run,
     card: Card,
-    suite: str,
     trace: Callable[[TrialKey], Trace],
     films: Mapping[str, bytes],
     practice: bool = False,
@@ -214,7 +211,7 @@ def write_bundle(
             add(name, layout.canonical(content))
         manifest = BundleManifest(
             format=layout.FORMAT,
-            suite=suite,
+            suite=run.manifest.suite,
             robospa=own_version(),
             practice=practice,
             inputs=inputs,

@@ -1,11 +1,8 @@
 """What continuous integration asks of a pull request that submits: one folder, two files, a bundle.
 
 The pull request is read as data: nothing that it brings is run. The bundle is downloaded, or copied
-from the folder, to a temporary file, as far as its announced size, verified by `robospa submit
-verify`, and held against the two files. Refused, each in one sentence: changes anywhere else,
-changes that are no additions, other files, a name that is taken, a bundle that is not what was
-announced, and one in the folder that is large or of weights that no recipe of this repository
-remakes.
+from the folder, as far as its announced size, verified by `robospa submit verify`, and held against
+the two files. All else is refused, in one sentence.
 """
 
 import shutil

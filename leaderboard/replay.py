@@ -1,11 +1,9 @@
 """Level 2, *replayed*: recorded actions fed to the simulator, ends compared with the records.
 
 A trial is *identical* if everything that a repeatable world decides is equal, the final state to
-the last bit, as on one kind of processor; it *agrees* if scene, instruction, end, success, first
-choice and progress are equal but the final state is not, as on another kind or with another build
-of the simulator; otherwise it is *different*. How far objects lie from where the records say is
-measured. Neither a GPU nor rendering is needed. Refuses nothing: the caller judges counts and
-distances.
+the last bit; it *agrees* if only the final state is not, as on another kind of processor or with
+another build of the simulator; otherwise it is *different*. How far objects lie from where the
+records say is measured. Neither a GPU nor rendering is needed. The caller judges.
 """
 
 from __future__ import annotations
@@ -99,8 +97,7 @@ def replay(
 ) -> SampleReplay:
     """Play `count` trials of a valid bundle again, chosen by `challenge`, in `workers` processes.
 
-    `on_trial` hears of each as it ends. Raises BundleError if the challenge is too short or the
-    simulator does not run here.
+    `on_trial` hears of each as it ends. Raises BundleError if the simulator does not run here.
     """
     keys = drawn(challenge, valid.manifest.bundle, valid.keys, count)
     traces = read_traces(valid, keys)

@@ -1,18 +1,12 @@
 """Level 3, *reproduced*: hidden scenes run against the submitter's server, held against the bundle.
 
-The server has to be what the bundle says: same spec, same settings. Successes, and those at the
-first choice, are tested exactly over everything and in every cell that can be sorted
-(`robospa.leaderboard.agreement`). A fresh trial that was repeated counts as a failure: the policy
-may have broken off the attempts that went badly. Passing means that the claim was not contradicted,
-which is worth a badge only if a lie of five points everywhere would have been noticed, and a rank
-in a cell only if one of twenty there alone would.
+The server has to be what the bundle says. Successes, and those at the first choice, are tested
+exactly over everything and in every cell (`robospa.leaderboard.agreement`). A fresh trial that was
+repeated counts as a failure: the policy may have broken off the attempts that went badly.
 
-A block of hidden scenes is fixed before a submitter can see them, and provably not chosen
-afterwards: a JSON file of a random salt and fresh seeds. The salt enters every random draw of
-scenes and sentences (`robospa.tasks.catalog.build_scene`), so nobody can draw them who has only the
-seeds. The block's hash, the commitment, is published first; the block itself when the trials are
-over. Refused: a block that does not hash to the commitment, that has seeds of the shipped range, or
-that gives a seed twice.
+A block of hidden scenes is a JSON file of a random salt and fresh seeds. The salt enters every
+random draw of scenes and sentences, so nobody can draw them who has only the seeds. The block's
+hash, the commitment, is published first; the block itself when the trials are over.
 """
 
 import json

@@ -56,10 +56,8 @@ class Reference:
     members: Callable[[str], Collection[str]]
     world: str = SAPIEN_NAME
     parts: str = TASK_PARTS
-    suite: str = SUITE
     robots: Sequence[str] = (REFERENCE,)
     modes: Sequence[str] = ("clean",)
-    splits: Sequence[str] = SPLITS
     durations: Durations | None = None
 
 
@@ -140,15 +138,15 @@ def check_settings(run: RunManifest, reference: Reference) -> RunSettings:
         raise BundleError(
             "the run executes actions at a fixed rate; the benchmark moves from rest to rest"
         )
-    if run.suite != reference.suite:
+    if run.suite != SUITE:
         raise BundleError(
             f"the run is of the suite {run.suite[:40]!a}; this robospa has "
-            f"{reference.suite!r}: verify it with the version that it was made with"
+            f"{SUITE!r}: verify it with the version that it was made with"
         )
     for name, known in (
         ("embodiment", reference.robots),
         ("mode", reference.modes),
-        ("split", reference.splits),
+        ("split", SPLITS),
     ):
         if (value := getattr(settings, name)[0]) not in known:
             raise BundleError(

@@ -1,9 +1,8 @@
 """The leaderboard as a folder of static pages that open from disk: no server, nothing loaded.
 
 `index.html` has all values as JSON and one table with views, filters and ranks; every model has a
-page with its tables, figures, failure types and films, made by the code of `robospa report`. Two
-submissions on equal seeds are compared by a script that is loaded when they are chosen. Names
-and texts are escaped by Jinja or become text nodes. Refuses to write into a folder of other things.
+page, made by the code of `robospa report`. Two submissions on equal seeds are compared by a script
+that is loaded when they are chosen. Names and texts are escaped by Jinja or become text nodes.
 """
 
 import json

@@ -1,11 +1,8 @@
 """What the leaderboard keeps of a bundle: one small folder a submission, without actions and rows.
 
-`docs/leaderboard.md` lists its files. The bundle's hash covers its files' hashes, so
-those of a folder are held against it again, and all averages are computed anew. Refused: anything
-else, in one sentence.
+`docs/leaderboard.md` lists its files, which are held against the bundle's hash again.
 
-A bundle that lies in the repository lets a clone verify it. Only a small one does, and only of a
-model whose weights a recipe of this repository remakes; all others stay at an address of their own.
+Only a small bundle lies in the repository itself, of a model whose weights a recipe there remakes.
 All of its trials are replayed, since whoever hands it in may also make the commit that would choose
 a sample.
 """

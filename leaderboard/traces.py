@@ -5,16 +5,12 @@
     uint32    actions of each trial
     4 planes  the differences from action to action, most significant bytes first
 
-All little-endian. Executed actions are quantised (`action_space`), so every number is a whole
-number of its steps; nothing finer can be written down, and the same float32 bits come back. Of each
-the difference to the action before is kept, small ones of either sign as small numbers; column by
-column through all trials, first all first bytes, then all second ones and so on. Deflate finds
-little in the first two planes and much noise in the last. The length of the file follows from its
-head, so nothing is allocated that the file does not hold.
+All little-endian. Executed actions are quantised (`action_space`), so the same float32 bits come
+back. Of each number the difference to the action before is kept, small ones of either sign as small
+numbers; column by column through all trials, first all first bytes, then all second ones and so on.
 
-Behind each action of a pose policy stands the joint action that was executed. A pose becomes joint
-targets by kinematics, which a later version may compute otherwise; the joint actions beside it are
-replayed instead, so an old bundle is replayed to the bit, and their physics steps follow from them.
+Behind each action of a pose policy stands the joint action that was executed. A later version may
+compute that otherwise from the pose; so it is what is replayed, and gives the physics steps.
 """
 
 import struct

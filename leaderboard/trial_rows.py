@@ -1,12 +1,9 @@
 """The rows of a bundle, one a trial: how they are chained, and what a trial's record can say.
 
 Each row has the hash of the row before and of its actions. The chain starts at the hash of the
-run's inputs, so a row cannot be changed, left out, repeated, moved or carried into another run
-without changing every row after it and the last hash, which the manifest and so the bundle's hash
-hold.
-
-A record that breaks one of the rules is of no trial that our harness ran. Whether a possible record
-is a true one is not decided here: replay does that.
+run's inputs, so whoever changes or moves a row changes every row after it and the bundle's hash. A
+record that breaks a rule is of no trial that our harness ran; whether a possible one is true is for
+replay to say.
 """
 
 import hashlib

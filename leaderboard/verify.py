@@ -1,9 +1,7 @@
 """Level 1, *valid*: everything that can be known of a bundle without running anything.
 
-Structure, versions, hashes, the chain, exactly the listed seeds, every record against its task and
-its own events, every action array against its record, lints, all scores and tables made again, and
-every scene and sentence.
-The first thing that is not as it has to be ends it, in one sentence.
+Structure, hashes, seeds, records, actions, lints, scores, scenes and sentences. The first thing
+that is not as it has to be ends it, in one sentence.
 """
 
 import hashlib
@@ -36,6 +34,7 @@ from robospa.results.scoring.models import IncomparableError, ModelResults, resu
 from robospa.results.scoring.repeats import was_repeated
 from robospa.results.scoring.scores import ScoresData, Variant, score_run, to_json
 from robospa.schema import pattern, read
+from robospa.tasks.scene import SUITE
 from robospa.trial import METRICS, TrialKey
 
 LISTING = ("unequal-trials", "missing")
@@ -81,7 +80,7 @@ def verify(
     are made again in `workers` processes (0: one a core); `done` hears how many of how many are.
     """
     with layout.BundleArchive(path, limits) as archive:
-        manifest = _manifest(archive, reference, practice)
+        manifest = _manifest(archive, practice)
         archive.listed = manifest.files
         claimed = rules.manifest_of(said := archive.read_map(layout.RUN))
         if where := compare_scores(claimed.to_json(), said):
@@ -164,9 +163,7 @@ def check_records(run: Run, reference: rules.Reference) -> list[str]:
     return warnings
 
 
-def _manifest(
-    archive: layout.BundleArchive, reference: rules.Reference, practice: bool
-) -> layout.BundleManifest:
+def _manifest(archive: layout.BundleArchive, practice: bool) -> layout.BundleManifest:
     """The manifest, held against the archive."""
     data = archive.read_map(layout.MANIFEST)
     version = data.get("format")
@@ -175,10 +172,10 @@ def _manifest(
     if version != layout.FORMAT:
         raise BundleError(f"the bundle has format {version}; this robospa reads {layout.FORMAT}")
     manifest = read(layout.BundleManifest, data, "the manifest", BundleError)
-    if manifest.suite != reference.suite:
+    if manifest.suite != SUITE:
         raise BundleError(
             f"the bundle is of the suite {manifest.suite[:40]!a}; this robospa has "
-            f"{reference.suite!r}: use the version that it was made with"
+            f"{SUITE!r}: use the version that it was made with"
         )
     if manifest.bundle != layout.bundle_hash(data):
         raise BundleError("the manifest was changed: its hash is not the bundle's")

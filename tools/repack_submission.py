@@ -48,7 +48,7 @@ def rewritten(old: Path, new: Path) -> dict[TrialKey, TrialRow]:
         films = {name: archive.read(name) for name in archive.sizes if name.endswith(".mp4")}
         card = to_card(archive.read_map(layout.CARD))
     whole = Run(old.parent, run, tuple(rows), {key: record for key, (record, _) in rows.items()})
-    write_bundle(new, whole, card, run.suite, stored.__getitem__, films)
+    write_bundle(new, whole, card, stored.__getitem__, films)
     return rows
 
 

@@ -256,16 +256,14 @@ class Belief:
                     self.put(hold.number, FALLEN * self._end(arm, row) * hold.offset)
                     self.held[arm] = None
             self.last = row
-        shut = [
-            h.number for arm, h in enumerate(self.held) if h and self._shut(arm, h, observation)
-        ]
-        for arm, hold in enumerate(self.held):
-            if hold is not None and hold.number in shut:
+        holds = [(arm, hold) for arm, hold in enumerate(self.held) if hold is not None]
+        shut = [hold.number for arm, hold in holds if self._shut(arm, hold, observation)]
+        for arm, hold in holds:
+            if hold.number in shut:
                 self.put(hold.number, hold.before)
                 self.held[arm] = None
-            elif hold is not None:
-                end = pose_of_row(observation["ee"][arm, :7])
-                self.put(hold.number, end * hold.offset)
+            else:
+                self.put(hold.number, pose_of_row(observation["ee"][arm, :7]) * hold.offset)
 
     def _shut(self, arm: int, hold: Grip, observation: Observation) -> bool:
         """Whether the fingers of an arm that should hold something came together."""

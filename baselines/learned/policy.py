@@ -75,8 +75,6 @@ class Learned:
         self._steps: list[Step] = []
         self._tries = 0
         self._answer: Any = None
-        self.log: list[tuple[Step, str]] = []
-        """Every step that was tried, and what came of it."""
 
     def infer(self, observation: Observation) -> Answer:
         """The next actions, float32 (T, D), or the calls of the next steps."""
@@ -136,7 +134,6 @@ class Learned:
     def _end(self, belief: Belief, failures: Sequence[str]) -> None:
         """Note what came of the steps; try again what failed."""
         failed = "; ".join(filter(None, (self._missed(belief, self._steps[0]), *failures)))
-        self.log += [(step, failed) for step in self._steps]
         self._tries += 1
         if failed and self._tries < TRIES:
             return

@@ -61,9 +61,6 @@ class TrainOptions:
 
 
 say = partial(print, flush=True)
-"""Tell how it gets on, at once."""
-
-
 Losses = Mapping[str, Tensor]
 """Parts of a loss, which are summed."""
 

@@ -584,24 +584,18 @@ def test_the_last_action_ends_with_the_goal(valid: Valid) -> None:
             check_trace(other, trace, record.actions_digest, reference, "joint")
 
 
-def test_all_scenes_are_made_again(valid: Valid) -> None:
+@pytest.mark.parametrize("workers", [1, 2])
+def test_all_scenes_are_made_again(
+    valid: Valid, monkeypatch: pytest.MonkeyPatch, workers: int
+) -> None:
+    monkeypatch.setattr("robospa.leaderboard.rules.FEW", 0)
     records, seen = dict(valid.run.records), list[tuple[int, int]]()
-    check_scenes(records, REFERENCE.parts, done=lambda *counts: seen.append(counts))
+    check_scenes(records, REFERENCE.parts, workers, lambda *counts: seen.append(counts))
     assert seen[-1] == (40, 40) and len(seen) == 10
     key = list(records)[-1]
     records[key] = replace(records[key], scene_digest="f" * 16)
     with pytest.raises(BundleError, match=f"{key.slug} has another scene"):
-        check_scenes(records, REFERENCE.parts)
-
-
-def test_other_processes_make_scenes_too(valid: Valid, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robospa.leaderboard.rules.FEW", 0)
-    records = dict(valid.run.records)
-    check_scenes(records, REFERENCE.parts, workers=2)
-    key = list(records)[-1]
-    records[key] = replace(records[key], instruction="x")
-    with pytest.raises(BundleError, match=f"{key.slug} has another sentence"):
-        check_scenes(records, REFERENCE.parts, workers=2)
+        check_scenes(records, REFERENCE.parts, workers)
 
 
 def test_a_real_scene_and_sentence_are_made_again() -> None:

@@ -12,6 +12,7 @@ from msgspec.structs import replace
 
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.packing import pack
+from robospa.leaderboard.submission import add
 from robospa.leaderboard.verify import verify
 from robospa.trial import TrialKey
 
@@ -39,19 +40,6 @@ def test_a_packed_run_is_valid(whole: Path) -> None:
 def test_the_same_run_gives_the_same_bytes(whole: Path, tmp_path: Path) -> None:
     pack([whole / "run"], CARD, tmp_path / "again.zip", REFERENCE)
     assert (tmp_path / "again.zip").read_bytes() == (whole / "b.zip").read_bytes()
-
-
-def test_nothing_that_a_submitter_may_choose_moves_the_films(whole: Path, tmp_path: Path) -> None:
-    def renamed(settings: dict[str, Any], about: dict[str, Any]) -> None:
-        settings["policy"]["spec"]["name"] = "try 239"
-        settings["policy"]["options"] = {"try": 239}
-
-    run = make_run(tmp_path / "run", change=renamed)
-    pack([run], CARD, tmp_path / "b.zip", REFERENCE)
-    one, two = (unzip(path) for path in (whole / "b.zip", tmp_path / "b.zip"))
-    assert json.loads(one["manifest.json"])["inputs"] != json.loads(two["manifest.json"])["inputs"]
-    films = [name for name in one if name.startswith("videos/")]
-    assert films and films == [name for name in two if name.startswith("videos/")]
 
 
 def test_two_runs_of_one_model_make_one_bundle(tmp_path: Path) -> None:
@@ -108,8 +96,10 @@ def test_no_bundle_is_written_if_one_robot_of_several_cannot_enter(tmp_path: Pat
 
 def test_practice_takes_a_few_trials_and_enters_no_leaderboard(tmp_path: Path) -> None:
     run = make_run(tmp_path / "run", [TrialKey(PICK, 1, s) for s in SEEDS[:2]])
-    pack([run], CARD, tmp_path / "b.zip", REFERENCE, practice=True, videos=False)
+    (packed,) = pack([run], CARD, tmp_path / "b.zip", REFERENCE, practice=True, videos=False)
     assert verify(tmp_path / "b.zip", REFERENCE, practice=True).evidence.trials == 2
+    with pytest.raises(BundleError, match="enters no leaderboard"):
+        add(packed, [], tmp_path / "home")
     with pytest.raises(BundleError, match="packed for practice"):
         verify(tmp_path / "b.zip", REFERENCE)
 
@@ -176,15 +166,12 @@ def test_changed_actions_are_refused(tmp_path: Path) -> None:
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run"]
 
 
-def test_a_bundle_that_is_there_is_not_replaced(whole: Path) -> None:
-    with pytest.raises(BundleError, match="--force"):
-        pack([whole / "run"], CARD, whole / "b.zip", REFERENCE)
-
-
-def test_a_bundle_that_is_there_is_replaced_if_that_is_asked_for(
+def test_a_bundle_that_is_there_is_replaced_only_if_that_is_asked_for(
     whole: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "b.zip").write_text("old")
+    with pytest.raises(BundleError, match="--force"):
+        pack([whole / "run"], CARD, tmp_path / "b.zip", REFERENCE)
     broken = replace(CARD, actions=replace(CARD.actions, chunk=50))
     with pytest.raises(BundleError, match="chunk = 50, but the policy that did Pick_Blocks_Size"):
         pack([whole / "run"], broken, tmp_path / "b.zip", REFERENCE, replace_old=True)

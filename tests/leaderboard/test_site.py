@@ -9,16 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bundle_fakes import CARD, CARD_TEXT, PICK, REFERENCE, SEEDS, make_run
+from bundle_fakes import CARD_TEXT
 from site_fakes import REPLAYED, REPRODUCED, change, make_submission, make_valid
 
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.entries import BADGES, HOW_REPRODUCED, all_entries, published_entries
-from robospa.leaderboard.packing import pack
 from robospa.leaderboard.site import build, index_page, write_model, write_site
 from robospa.leaderboard.submission import add, left_out, read_submission, read_submissions, slug_of
 from robospa.results.paper.columns import Column
-from robospa.trial import TrialKey
 
 pytestmark = pytest.mark.usefixtures("no_figures")
 
@@ -231,13 +229,6 @@ def test_what_was_handed_in_has_to_fit_the_bundle(tmp_path: Path) -> None:
     assert add(valid, [], home, "mine") == folder
     assert read_submissions(home)[0].evidence.address == "https://a.org/b.zip"
     assert left_out(home) == {}
-
-
-def test_a_bundle_for_practice_is_no_submission(tmp_path: Path) -> None:
-    run = make_run(tmp_path / "run", [TrialKey(PICK, 1, s) for s in SEEDS])
-    (packed,) = pack([run], CARD, tmp_path / "b.zip", REFERENCE, practice=True, videos=False)
-    with pytest.raises(BundleError, match="enters no leaderboard"):
-        add(packed, [], tmp_path / "home")
 
 
 def test_a_folder_called_like_a_published_model_is_refused_and_left_out(
