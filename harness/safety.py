@@ -132,7 +132,7 @@ class SafetyRecorder(Recorder):
     def polled(self, world: World, time: float) -> None:
         """Note what falls, and where the arms are."""
         physics = self._physics
-        for name, component in physics.moving().items():
+        for name, component in physics.moving.items():
             speed = float(component.linear_velocity[2])
             if speed < FALLING and name not in self._falling | self._touched:
                 x, y, z = component.entity.pose.p.tolist()

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from robospa.geometry import angle_between
-from robospa.harness.sim.lazy_snapshot import FLOATS
 from robospa.harness.sim.motion import RATE
-from robospa.harness.sim.physics import Physics
+from robospa.harness.sim.physics import Physics, packed_poses
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.world import SceneUnstable
 from robospa.observation import Observation
@@ -50,13 +49,13 @@ class OfficialWorld(SapienWorld):
 
 def _wait(physics: Physics, where: str) -> None:
     """Let 11 s pass; SceneUnstable if something still turns at their end."""
-    names = list(physics.moving())
+    names = list(physics.moving)
     for _ in range(STEPS - LOOKED_AT):
         physics.step()
-    turns = [_turns(physics, names)]
+    turns = [packed_poses(physics, names)[:, :4]]
     for _ in range(LOOKED_AT):
         physics.step()
-        turns.append(_turns(physics, names))
+        turns.append(packed_poses(physics, names)[:, :4])
     if not names:
         return
     last = np.tile(turns[-1], (len(turns), 1))
@@ -67,8 +66,3 @@ def _wait(physics: Physics, where: str) -> None:
             f"object {names[worst]!r} of {where} still turns after {STEPS / RATE:g} s; this seed "
             "is not valid"
         )
-
-
-def _turns(physics: Physics, names: list[str]) -> np.ndarray:
-    poses = np.frombuffer(physics.packed(), dtype=np.float32).reshape(-1, FLOATS)
-    return poses[[physics.rows[name] for name in names], :4].astype(np.float64)

@@ -22,7 +22,7 @@ from robospa.harness.packs import mesh_files
 from robospa.harness.packs.archive import Archive, ArchiveError, Arrays, cached
 from robospa.harness.packs.mesh_files import Floats, Ints, RawMesh
 from robospa.harness.packs.urdf import MeshUse, Urdf, check_files, key_of, read_urdf
-from robospa.harness.robots.embodiment import Arm, Embodiment, Joint
+from robospa.harness.robots.embodiment import Arm, Embodiment
 from robospa.tasks.objects.meshes import shaded_corners
 from robospa.tasks.shapes import Skin
 
@@ -174,42 +174,34 @@ def check_robot(archive: Archive, robot: Embodiment) -> None:
 
 
 def _robot_urdf(archive: Archive, robot: Embodiment) -> Urdf:
-    kind = robot.name.partition(":")[0]  # its arms may stand farther apart
+    """The URDF file of the robot's folder that has its arm's joints; of several the first by
+    name."""
+    arm, kind = robot.arms[0], robot.name.partition(":")[0]  # its arms may stand farther apart
     folder = archive.root / "embodiments" / kind
     if not folder.is_dir():
         raise ArchiveError(
             f"there are no meshes of {robot.name} in {str(archive.root / 'embodiments')!r}; unpack "
             "embodiments.zip of the official data there"
         )
-    return _urdf_of(archive, folder, robot.arms[0])
+    for file in sorted(folder.rglob("*.urdf"))[:MOST_FILES]:
+        urdf = read_urdf(file, archive.inside)
+        if all(joint.name in _names(urdf) for joint in arm.joints):
+            return urdf
+    missing = ", ".join(joint.name for joint in arm.joints)
+    raise ArchiveError(f"no URDF file in {str(folder)!r} has the joints {missing}")
 
 
 def _carriers(urdf: Urdf, arm: Arm) -> dict[str, str]:
     """Our link for each link of the URDF file that carries others: the base, and all that our
     joints move."""
     children = _names(urdf)
-    found = {children[j.name]: j.child for j in _joints(arm) if j.name in children}
+    found = {children[j.name]: j.child for j in arm.all_joints if j.name in children}
     return {urdf.joints[children[arm.joints[0].name]].parent: arm.base_link, **found}
-
-
-def _joints(arm: Arm) -> tuple[Joint, ...]:
-    return (*arm.joints, *arm.fingers)
 
 
 def _names(urdf: Urdf) -> dict[str, str]:
     """The child link of each joint by the joint's name."""
     return {joint.name: child for child, joint in urdf.joints.items()}
-
-
-def _urdf_of(archive: Archive, folder: Path, arm: Arm) -> Urdf:
-    """The URDF file below `folder` that has the arm's joints; of several the first by name."""
-    files = sorted(folder.rglob("*.urdf"))[:MOST_FILES]
-    for file in files:
-        urdf = read_urdf(file, archive.inside)
-        if all(joint.name in _names(urdf) for joint in arm.joints):
-            return urdf
-    missing = ", ".join(joint.name for joint in arm.joints)
-    raise ArchiveError(f"no URDF file in {str(folder)!r} has the joints {missing}")
 
 
 def _arm_skins(
@@ -240,6 +232,6 @@ def _arm_skins(
 def _frames_at_zero(arm: Arm) -> dict[str, Floats]:
     """(4, 4) frame of each of our links in the base link's, all joints at 0."""
     found: dict[str, Floats] = {arm.base_link: np.eye(4)}
-    for joint in _joints(arm):
+    for joint in arm.all_joints:
         found[joint.child] = found[joint.parent] @ to_transform(joint.origin)
     return found

@@ -70,7 +70,12 @@ class Arm:
     @property
     def links(self) -> tuple[str, ...]:
         """All link names, base first, in creation order."""
-        return (self.base_link, *(j.child for j in (*self.joints, *self.fingers)))
+        return (self.base_link, *(joint.child for joint in self.all_joints))
+
+    @property
+    def all_joints(self) -> tuple[Joint, ...]:
+        """Joints and fingers, in creation order."""
+        return (*self.joints, *self.fingers)
 
     def gripper_value(self, opening: float) -> float:
         """The gripper value, 0..1, at which the fingers are `opening` [m] apart."""

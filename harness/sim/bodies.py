@@ -5,8 +5,6 @@ drawn lives in another one (`robospa.harness.sim.renderer`), so that a trial is 
 whether anybody looks at it or not. Meshes collide as their convex hull.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
@@ -16,7 +14,7 @@ import sapien
 from numpy.typing import NDArray
 from sapien import physx
 
-from robospa.geometry import Pose, Quat, Vec3, axis_rotation, look_rotation, multiply
+from robospa.geometry import Pose, Quat, axis_rotation, look_rotation, multiply
 from robospa.harness.robots.embodiment import Arm, Joint
 from robospa.tasks.shapes import Box, Cylinder, Geometry, ObjectModel, Shape, Sphere
 
@@ -179,22 +177,17 @@ def entity_of(component: sapien.Component, name: str, pose: Pose) -> sapien.Enti
     return entity
 
 
-def _link_inertia(arm: Arm, link: str, mass: float) -> tuple[sapien.Pose, Array]:
-    """Centre of mass (as pose) and principal inertia (3,) of `mass` [kg] spread over a link.
+def _link_inertia(arm: Arm, link: str) -> tuple[sapien.Pose, Array]:
+    """Centre of mass (as pose) and principal inertia (3,) of a link's mass spread over it.
 
     A block from the link's own joint to those that it carries: it follows from the joints alone, so
     that what a robot looks like does not change how it moves.
     """
-    carried = [j.origin.position for j in (*arm.joints, *arm.fingers) if j.parent == link]
-    return _block_around(tuple(carried), mass)
-
-
-@lru_cache(maxsize=256)
-def _block_around(carried: tuple[Vec3, ...], mass: float) -> tuple[sapien.Pose, Array]:
+    carried = [joint.origin.position for joint in arm.all_joints if joint.parent == link]
     points = np.array([(0.0, 0.0, 0.0), *carried])
     low, high = points.min(axis=0) - LINK_MARGIN, points.max(axis=0) + LINK_MARGIN
     x, y, z = high - low
-    inertia = mass / 12.0 * np.array([y * y + z * z, x * x + z * z, x * x + y * y])
+    inertia = arm.link_mass / 12.0 * np.array([y * y + z * z, x * x + z * z, x * x + y * y])
     return sapien.Pose((low + high) / 2), inertia
 
 
@@ -220,7 +213,7 @@ def build_arm(scene: sapien.Scene, arm: Arm, prefix: str) -> physx.PhysxArticula
     builder.set_initial_pose(to_sapien(arm.base))
     fingers = {finger.child for finger in arm.fingers}
     made: dict[str, LinkBuilder] = {}
-    incoming = {joint.child: joint for joint in (*arm.joints, *arm.fingers)}
+    incoming = {joint.child: joint for joint in arm.all_joints}
     for link in arm.links:
         joint = incoming.get(link)
         record = builder.create_link_builder(made[joint.parent] if joint else None)
@@ -236,7 +229,7 @@ def build_arm(scene: sapien.Scene, arm: Arm, prefix: str) -> physx.PhysxArticula
         component = entity.components[0]
         attach_collisions(component, arm.shapes[link], material(), groups=ROBOT_GROUPS)
         component.mass = arm.link_mass
-        component.cmass_local_pose, component.inertia = _link_inertia(arm, link, arm.link_mass)
+        component.cmass_local_pose, component.inertia = _link_inertia(arm, link)
         component.disable_gravity = True
     articulation = entities[0].components[0].articulation
     for joint in articulation.active_joints:

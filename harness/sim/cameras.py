@@ -7,16 +7,14 @@ lines and points, images of positions and segmentation, and on its first picture
 table for environment maps, five seconds of two cores in software.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 from threading import get_ident
-from typing import TYPE_CHECKING
 
 import numpy as np
+import sapien
 from numpy.typing import NDArray
 
 from robospa.geometry import Pose, rotate
@@ -24,9 +22,6 @@ from robospa.harness.sim.antialiasing import Smoother
 from robospa.harness.sim.bodies import to_sapien
 from robospa.harness.world import CameraView
 from robospa.observation import CameraSpec
-
-if TYPE_CHECKING:
-    import sapien
 
 SHADER = Path(__file__).parent / "shader"
 """Folder of the shader; its files are compiled when a process makes its first camera."""
@@ -41,8 +36,6 @@ def new_camera(
     scene: sapien.Scene, width: int, height: int, shader: str = str(SHADER)
 ) -> sapien.render.RenderCameraComponent:
     """A camera of `width` by `height` px on an entity of its own; `shader` "" is SAPIEN's."""
-    import sapien
-
     camera = sapien.render.RenderCameraComponent(width, height, shader)
     entity = sapien.Entity()
     entity.add_component(camera)

@@ -4,25 +4,22 @@ Wall and table top have a second, textured form each, made once; a new scene upl
 it. Nothing here holds state of a trial: `dress` sets all that a scene can change.
 """
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
+import sapien
 from numpy.typing import NDArray
 
 from robospa.geometry import Pose, look_rotation
 from robospa.harness import textures
+from robospa.harness.sim.bodies import to_sapien
 from robospa.harness.sim.cameras import add_copies
+from robospa.harness.sim.render_bodies import image_texture, render_body, textured_body
 from robospa.harness.textures.field import SIZE
 from robospa.tasks.colors import TABLE_COLOR
 from robospa.tasks.scene import WHITE, Lights, Surroundings, Texture
 from robospa.tasks.shapes import Box, Color, Shape
 from robospa.workcell import WORKCELL, TableGeometry
-
-if TYPE_CHECKING:
-    import sapien
 
 LEGS: Color = (0.86, 0.86, 0.85)
 WALL: Color = (1.0, 0.9, 0.9)
@@ -84,8 +81,6 @@ class Surface:
     def __init__(
         self, scene: sapien.Scene, shapes: tuple[Shape, ...], name: str, copies: int
     ) -> None:
-        from robospa.harness.sim.render_bodies import render_body
-
         self._scene, self._shapes, self._name, self._copies = scene, shapes, name, copies
         self._plain = render_body(shapes, name, copies)
         self._textured: sapien.Entity | None = None
@@ -102,8 +97,6 @@ class Surface:
             self.shown = wanted
 
     def _with(self, image: NDArray[np.uint8]) -> sapien.Entity:
-        from robospa.harness.sim.render_bodies import image_texture, textured_body
-
         pixels = np.dstack([image, np.full(image.shape[:2], 255, np.uint8)])
         if self._image is None:
             self._image = image_texture(pixels)
@@ -119,8 +112,6 @@ class Surface:
 
     def place(self, pose: Pose) -> None:
         """Stand there, plain or not."""
-        from robospa.harness.sim.bodies import to_sapien
-
         for entity in (self._plain, self._textured):
             if entity is not None:
                 entity.pose = to_sapien(pose)
@@ -133,8 +124,6 @@ class DrawnFurniture:
     """
 
     def __init__(self, scene: sapien.Scene, copies: int = 1) -> None:
-        from robospa.harness.sim.bodies import to_sapien
-
         self.textures = textures.source()
         self._scene = scene
         self._wall = Surface(scene, wall(), "wall", copies)
@@ -159,8 +148,6 @@ class DrawnFurniture:
     def _lamp(
         self, at: tuple[float, float, float], color: tuple[float, float, float]
     ) -> sapien.render.RenderSpotLightComponent:
-        from robospa.harness.sim.bodies import to_sapien
-
         way = (-at[0] * math.sin(LAMP_TILT), 0.0, -math.cos(LAMP_TILT))
         lamp = self._scene.add_spot_light(
             at, way, LAMP_VIEW, LAMP_VIEW, color, shadow=True,

@@ -5,13 +5,10 @@ in the same process. There is no render system in here (drawing happens in anoth
 bodies are created in an order that follows from the trial alone.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import sapien
@@ -22,15 +19,12 @@ from robospa.action_space import ARMS
 from robospa.geometry import Pose, Vec3, angle_between
 from robospa.harness.robots.embodiment import Arm, Embodiment
 from robospa.harness.sim import bodies, furniture
-from robospa.harness.sim.lazy_snapshot import FLOATS, NO_HINGES, unpack
+from robospa.harness.sim.lazy_snapshot import FLOATS, NO_HINGES, Pair, unpack
 from robospa.harness.sim.motion import RATE, Trajectory
 from robospa.harness.world import SceneUnstable
 from robospa.tasks.shapes import Hinge, ObjectModel
 from robospa.tasks.snapshot import Contact
 from robospa.workcell import WORKCELL
-
-if TYPE_CHECKING:
-    from sapien import physx
 
 Array = NDArray[np.float64]
 
@@ -38,7 +32,8 @@ FURNITURE = ("ground", "table", "wall")
 
 
 class Physics:
-    """The physics of one trial; `step` is SAPIEN's own."""
+    """The physics of one trial; `step` is SAPIEN's own, `moving` has the components of the objects
+    that can move, by name."""
 
     def __init__(self, embodiment: Embodiment, table_at: Vec3) -> None:
         """`table_at` is how far [m] the table is moved from its usual place."""
@@ -49,10 +44,8 @@ class Physics:
         self._pack = self.scene.pack_poses
         self.links: list[dict[str, int]] = []
         self.rows: dict[str, int] = {}
-        self.components: dict[str, physx.PhysxRigidBaseComponent] = {}
-        self._moving: dict[str, physx.PhysxRigidBaseComponent] = {}
-        self._hinged: dict[str, physx.PhysxArticulation] = {}
-        self._parts: dict[str, Hinge] = {}
+        self.moving: dict[str, physx.PhysxRigidBaseComponent] = {}
+        self._hinged: dict[str, tuple[physx.PhysxArticulation, Hinge]] = {}
         self._add(bodies.ground_body("ground"))
         table = furniture.table(WORKCELL.table)
         self._add(bodies.static_body(table, "table", Pose(table_at)))
@@ -75,30 +68,23 @@ class Physics:
 
         Its mass follows from its `density` [kg/m^3] if that is given, else it is the model's.
         """
+        # snapshots keep the table of rows that they saw
         if model.hinge is not None:
-            self._add_hinged(name, model, pose, fixed)
+            body, part, articulation = bodies.hinged_body(model, name, pose, fixed)
+            self.rows = {**self.rows, name: self._add(body)}
+            self._add(part)
+            self._hinged[name] = articulation, model.hinge
             return
         entity, component = bodies.dynamic_body(model, name, pose, fixed, density)
-        self.rows = {**self.rows, name: self._add(entity)}  # snapshots keep the table they saw
-        self.components[name] = component
+        self.rows = {**self.rows, name: self._add(entity)}
         if not fixed:
-            self._moving[name] = component
-
-    def _add_hinged(self, name: str, model: ObjectModel, pose: Pose, fixed: bool) -> None:
-        """The body's row comes first, that of its part right after it."""
-        body, part, articulation = bodies.hinged_body(model, name, pose, fixed)
-        self.rows = {**self.rows, name: self._add(body)}
-        self._add(part)
-        self.components[name] = body.components[0]
-        self._hinged[name] = articulation
-        assert model.hinge is not None
-        self._parts[name] = model.hinge
+            self.moving[name] = component
 
     def hinges(self) -> Mapping[str, float]:
         """Angle [rad] of every hinged part, by the name of its object."""
         if not self._hinged:
             return NO_HINGES
-        return {name: float(one.qpos[0]) for name, one in self._hinged.items()}
+        return {name: float(one.qpos[0]) for name, (one, _) in self._hinged.items()}
 
     def packed(self) -> bytes:
         """Poses of all entities, as `robospa.harness.sim.lazy_snapshot` unpacks them."""
@@ -115,7 +101,7 @@ class Physics:
         packed = self.packed()
         found = {name: unpack(packed, row) for name, row in {**rows, **self.rows}.items()}
         for name, angle in self.hinges().items():
-            found[f"{name} part"] = found[name] * self._parts[name].turned(angle)
+            found[f"{name} part"] = found[name] * self._hinged[name][1].turned(angle)
         return found
 
     def contacts(self) -> tuple[Contact, ...]:
@@ -139,18 +125,14 @@ class Physics:
                 found.append((one, other, (x, y, z), any(point.impulse.tolist())))
         return tuple([Contact(*row) for row in sorted(found)])
 
-    def moving(self) -> dict[str, physx.PhysxRigidBaseComponent]:
-        """Components of the objects that can move, by name."""
-        return self._moving
-
     def digest(self) -> str:
         """Hash of poses, velocities and joints: of their very bytes, in a fixed order."""
         state = hashlib.sha256(self.scene.pack_poses())
-        for name, component in self._moving.items():
+        for name, component in self.moving.items():
             state.update(name.encode())
             state.update(component.linear_velocity.tobytes())
             state.update(component.angular_velocity.tobytes())
-        for arm in (*self.arms, *self._hinged.values()):
+        for arm in (*self.arms, *(one for one, _ in self._hinged.values())):
             state.update(arm.qpos.tobytes())
             state.update(arm.qvel.tobytes())
         return state.hexdigest()
@@ -158,8 +140,7 @@ class Physics:
     def close(self) -> None:
         """Let go of the simulator's scene."""
         self.scene.clear()
-        self.arms, self.components, self._moving = [], {}, {}
-        self._hinged = {}
+        self.arms, self.moving, self._hinged = [], {}, {}
 
 
 WINDOW = 25
@@ -178,15 +159,15 @@ def settle(physics: Physics, where: str) -> None:
     SceneUnstable, naming `where` and the object, if one still moves after WINDOWS or has left
     the table.
     """
-    names = list(physics.moving())
+    names = list(physics.moving)
     if not names:
         return
-    before = _state(physics, names)
+    before = packed_poses(physics, names)
     quiet, restless = 0, ""
     for _ in range(WINDOWS):
         for _ in range(WINDOW):
             physics.step()
-        after = _state(physics, names)
+        after = packed_poses(physics, names)
         moved = mover(names, before, after)
         restless = moved or restless
         quiet = 0 if moved else quiet + 1
@@ -206,8 +187,8 @@ def settle(physics: Physics, where: str) -> None:
         )
 
 
-def _state(physics: Physics, names: list[str]) -> Array:
-    """Packed poses (N, 7: rotation, position) of the named objects."""
+def packed_poses(physics: Physics, names: list[str]) -> Array:
+    """Poses (N, 7: rotation, position) of the named objects."""
     poses = np.frombuffer(physics.packed(), dtype=np.float32).reshape(-1, FLOATS)
     return poses[[physics.rows[name] for name in names]].astype(np.float64)
 
@@ -223,19 +204,25 @@ def mover(names: list[str], before: Array, after: Array) -> str:
 
 Opening = TypeVar("Opening", float, Array)
 Setter = Callable[[float], None]
-Pair = tuple[tuple[float, ...], tuple[float, ...]]
 
 
-@dataclass(frozen=True)
 class _ArmDrives:
     """SAPIEN's setters of one arm's drives, and where its joints are in qpos."""
 
-    articulation: physx.PhysxArticulation
-    position: list[Setter]
-    velocity: list[Setter]
-    fingers: list[Setter]
-    columns: list[int]
-    finger_columns: list[int]
+    def __init__(self, arm: Arm, articulation: physx.PhysxArticulation) -> None:
+        self.arm, self.articulation = arm, articulation
+        active = articulation.active_joints
+        column = {joint.name: i for i, joint in enumerate(active)}
+        self.columns = [column[joint.name] for joint in arm.joints]
+        self.finger_columns = [column[finger.name] for finger in arm.fingers]
+        self.position: list[Setter] = [active[c].set_drive_target for c in self.columns]
+        self.velocity: list[Setter] = [active[c].set_drive_velocity_target for c in self.columns]
+        self.fingers: list[Setter] = [active[c].set_drive_target for c in self.finger_columns]
+
+    def travel(self, opening: Opening) -> Opening:
+        """Finger travel [m] of gripper values 0..1."""
+        closed, opened = self.arm.travel
+        return closed + opening * (opened - closed)
 
 
 class Drives:
@@ -256,18 +243,14 @@ class Drives:
         articulations: list[physx.PhysxArticulation],
         grip: float = 1.0,
     ) -> None:
-        self._embodiment = embodiment
-        self._arms = [
-            _bind(arm, articulation)
-            for arm, articulation in zip(embodiment.arms, articulations, strict=True)
-        ]
-        for arm, side in zip(self._arms, embodiment.arms, strict=True):
-            for column in arm.finger_columns if grip < 1.0 else ():
-                joint = arm.articulation.active_joints[column]
-                joint.set_drive_properties(grip * side.stiffness, grip * side.damping)
+        self._arms = list(map(_ArmDrives, embodiment.arms, articulations))
         home = np.zeros((2, 1, max(len(arm.joints) for arm in embodiment.arms)))
-        for a, side in enumerate(embodiment.arms):
-            home[a, 0, : len(side.joints)] = side.home
+        for a, drives in enumerate(self._arms):
+            arm = drives.arm
+            home[a, 0, : len(arm.joints)] = arm.home
+            for column in drives.finger_columns if grip < 1.0 else ():
+                joint = drives.articulation.active_joints[column]
+                joint.set_drive_properties(grip * arm.stiffness, grip * arm.damping)
         opened = np.ones((2, 1))
         self.now = (Trajectory(home, np.zeros_like(home), opened, opened), 0)
         self._go_home()
@@ -291,22 +274,16 @@ class Drives:
         return path.gripper[:, row]
 
     def _go_home(self) -> None:
-        for a, arm in enumerate(self._arms):
+        for arm in self._arms:
             qpos = np.zeros(arm.articulation.dof, dtype=np.float32)
-            side = self._embodiment.arms[a]
-            qpos[arm.columns] = side.home
-            upper = [finger.upper for finger in side.fingers]
-            qpos[arm.finger_columns] = np.minimum(self._travel(a, 1.0), upper)
+            qpos[arm.columns] = arm.arm.home
+            upper = [finger.upper for finger in arm.arm.fingers]
+            qpos[arm.finger_columns] = np.minimum(arm.travel(1.0), upper)
             arm.articulation.qpos = qpos
             arm.articulation.qvel = np.zeros_like(qpos)
             for joint, value in zip(arm.articulation.active_joints, qpos.tolist(), strict=True):
                 joint.set_drive_target(value)
                 joint.set_drive_velocity_target(0.0)
-
-    def _travel(self, arm: int, opening: Opening) -> Opening:
-        """Finger travel [m] of gripper values 0..1."""
-        closed, opened = self._embodiment.arms[arm].travel
-        return closed + opening * (opened - closed)
 
     def schedule(self, path: Trajectory) -> tuple[list[Setter], Array]:
         """Setters to call in every physics step of `path`, and their values (n, setters)."""
@@ -321,7 +298,7 @@ class Drives:
                 columns += [path.joints[a, :, j], path.velocities[a, :, j]]
             if path.gripper[a, 0] != opening[a] or path.gripper[a, -1] != opening[a]:
                 calls += arm.fingers
-                columns += [self._travel(a, path.gripper[a])] * len(arm.fingers)
+                columns += [arm.travel(path.gripper[a])] * len(arm.fingers)
         table = np.empty((len(path), len(calls)))
         for i, column in enumerate(columns):
             table[:, i] = column
@@ -350,23 +327,8 @@ class Drives:
         for a, arm in enumerate(self._arms):
             opening = float(gripper[a])
             if measured:
-                closed, opened = self._embodiment.arms[a].travel
+                closed, opened = arm.arm.travel
                 travel = float(arm.articulation.qpos[arm.finger_columns].mean())
                 opening = min(1.0, max(0.0, (travel - closed) / (opened - closed)))
             parts += [*joints[a][: len(arm.columns)], opening]
         return np.array(parts, dtype=np.float32)
-
-
-def _bind(arm: Arm, articulation: physx.PhysxArticulation) -> _ArmDrives:
-    active = articulation.active_joints
-    column = {joint.name: i for i, joint in enumerate(active)}
-    joints = [column[joint.name] for joint in arm.joints]
-    fingers = [column[finger.name] for finger in arm.fingers]
-    return _ArmDrives(
-        articulation=articulation,
-        position=[active[c].set_drive_target for c in joints],
-        velocity=[active[c].set_drive_velocity_target for c in joints],
-        fingers=[active[c].set_drive_target for c in fingers],
-        columns=joints,
-        finger_columns=fingers,
-    )

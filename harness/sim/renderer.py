@@ -15,13 +15,17 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
+import sapien
 from numpy.typing import NDArray
 
 from robospa.action_space import ARMS
 from robospa.geometry import Pose
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.sim import cameras as pictures
+from robospa.harness.sim.bodies import to_sapien
 from robospa.harness.sim.furniture import DrawnFurniture
+from robospa.harness.sim.render_bodies import render_body
+from robospa.harness.sim.vulkan import VulkanError, devices
 from robospa.harness.world import OTHER, TABLE, CameraView, RenderUnavailable
 from robospa.observation import CameraSpec
 from robospa.tasks.objects import object_model
@@ -29,8 +33,6 @@ from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Hinge, Shape, Skin
 
 if TYPE_CHECKING:
-    import sapien
-
     from robospa.harness.packs.visuals import RobotSkins
 
 Links = Sequence[Mapping[str, Pose]]
@@ -49,10 +51,8 @@ ADVICE = "run `robospa check` to see what is missing"
 def open_render_system() -> sapien.render.RenderSystem:
     """A SAPIEN render system; RenderUnavailable, with the reason, where there is no device."""
     try:
-        import sapien
-
         return sapien.render.RenderSystem()
-    except (ImportError, RuntimeError) as error:
+    except RuntimeError as error:
         raise RenderUnavailable(f"cannot draw on this machine ({error}); {ADVICE}") from error
 
 
@@ -65,8 +65,6 @@ class Renderer:
     def __init__(self, skins: Callable[[Embodiment], RobotSkins] | None = None) -> None:
         self._skins = skins
         self._system = open_render_system()
-        import sapien
-
         self._scene: sapien.Scene = sapien.Scene([self._system])
         self._copies = pictures.MOST if self._system.device.name.startswith(SOFTWARE) else 1
         self._cameras: dict[tuple[CameraSpec, Path], sapien.render.RenderCameraComponent] = {}
@@ -84,8 +82,6 @@ class Renderer:
         self, shapes: Sequence[Shape], name: str, skin: Skin | None = None
     ) -> sapien.Entity | None:
         """An entity in the drawn scene; None if none of the shapes is visual and it has no skin."""
-        from robospa.harness.sim.render_bodies import render_body
-
         entity = render_body(shapes, name, self._copies, skin)
         if entity is not None:
             pictures.add_copies(self._scene, entity)
@@ -225,8 +221,6 @@ class Renderer:
 
     @staticmethod
     def _place(entity: sapien.Entity, pose: Pose) -> None:
-        from robospa.harness.sim.bodies import to_sapien
-
         entity.pose = to_sapien(pose)
 
     def view(self, spec: CameraSpec, links: Links) -> CameraView:
@@ -267,8 +261,6 @@ class Renderer:
 
     def device(self) -> Mapping[str, str]:
         """Name of the device that draws, its driver and the driver's version."""
-        from robospa.harness.sim.vulkan import VulkanError, devices
-
         name = str(self._system.device.name)
         try:
             found = [device for device in devices() if device.name == name]

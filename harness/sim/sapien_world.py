@@ -8,7 +8,7 @@ first physics step, and between two polls there is nothing but SAPIEN's own call
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
@@ -185,9 +185,7 @@ class SapienWorld:
             drives.now = (path, done - 1)
             if self._later:
                 self._appear(physics)
-            if self._steps % POLL_STEPS == 0 and poll(
-                self._snapshot(self._measured_at, self._touching_at)
-            ):
+            if self._steps % POLL_STEPS == 0 and poll(self._snapshot(physics)):
                 drives.stop()
                 return done, True
         return done, False
@@ -196,46 +194,47 @@ class SapienWorld:
 
     def snapshot(self) -> Snapshot:
         """The state at this instant."""
-        self.loaded()
-        measured = self._drives.measured()
-        touching = self._touching_at(self._steps)
-        return self._snapshot(lambda steps: measured, lambda steps: touching)
+        seen = self._snapshot(self.loaded())
+        _ = seen.measured, seen.contacts  # kept from now on, whatever the world does
+        return seen
 
-    def _snapshot(
-        self, measure: Callable[[int], Pair], touching: Callable[[int], tuple[Contact, ...]]
-    ) -> Snapshot:
-        physics = self.loaded()
+    def _snapshot(self, physics: Physics) -> Snapshot:
         return LazySnapshot(
             self._steps,
             physics.packed(),
             physics.rows,
             self._layout,
             self._drives.now,
-            measure,
-            touching,
+            self._measured_at,
+            self._touching_at,
             physics.hinges(),
         )
 
     def _measured_at(self, steps: int) -> Pair:
         """Measured joints for a poll: read only if asked for, because that costs microseconds."""
-        if steps != self._steps:
-            raise RuntimeError("a poll's measured joints were asked for after the world moved on")
+        self._still_at(steps)
         return self._drives.measured()
 
     def _touching_at(self, steps: int) -> tuple[Contact, ...]:
         """Contacts for a poll, likewise; none if `load` was not asked for them."""
-        if steps != self._steps:
-            raise RuntimeError("a poll's contacts were asked for after the world moved on")
+        self._still_at(steps)
         return self.loaded().contacts() if self._contacts else ()
+
+    def _still_at(self, steps: int) -> None:
+        if steps != self._steps:
+            raise RuntimeError(
+                "a poll's contacts or measured joints were asked for after the world moved on"
+            )
 
     def observe(self, spec: PolicySpec) -> Observation:
         """Images, state and poses that `spec` asks for; see `robospa.observation`.
 
         `state` is left out if the spec wants none, `privileged` and `environment_state` unless it
-        wants them. The caller adds instruction, step and history.
+        wants them; TooManyObjects for a scene that has no such state. The caller adds instruction,
+        step and history.
         """
         snapshot = self.snapshot()
-        images = self._pictures(spec.cameras)
+        images = self.draw(self.still(), spec.cameras) if spec.cameras else []
         out: Observation = {
             "images": {c.name: image for c, image in zip(spec.cameras, images, strict=True)}
         }
@@ -251,14 +250,10 @@ class SapienWorld:
         if spec.privileged:
             out["privileged"] = snapshot_to_json(snapshot)
         if spec.environment_state:
-            out["environment_state"] = self._environment_state().row(snapshot)
+            if self._objects is None:
+                self._objects = EnvironmentState(self._scene)
+            out["environment_state"] = self._objects.row(snapshot)
         return out
-
-    def _environment_state(self) -> EnvironmentState:
-        """That of the loaded scene; TooManyObjects if it has none."""
-        if self._objects is None:
-            self._objects = EnvironmentState(self._scene)
-        return self._objects
 
     def render(self, camera: CameraSpec) -> NDArray[np.uint8]:
         """One RGB image (height, width, 3); RenderUnavailable where nothing can be drawn."""
@@ -272,9 +267,6 @@ class SapienWorld:
         # Only flickering lights know the time: elsewhere two instants at rest look the same.
         rows, step = physics.rows, self._steps if lights.flicker is not None else 0
         return SapienState(physics.packed(), rows, hinges, step, self, self._scene)
-
-    def _pictures(self, cameras: Sequence[CameraSpec]) -> list[NDArray[np.uint8]]:
-        return self.draw(self.still(), cameras) if cameras else []
 
     def draw(self, still: SapienState, cameras: Sequence[CameraSpec]) -> list[NDArray[np.uint8]]:
         """Images of a still of the loaded scene; RuntimeError for that of another one."""

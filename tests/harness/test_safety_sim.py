@@ -59,7 +59,7 @@ def fallen(watched: bool) -> tuple[str, list[float]]:
         recorder.started(world)
     pose = world.snapshot().poses[name]
     x, y, z = pose.position
-    component = world.loaded().moving()[name]
+    component = world.loaded().moving[name]
     component.entity.pose = to_sapien(Pose((x + 0.03, y, z + 0.2), pose.rotation))
     hold = world.observe(PolicySpec("hold", cameras=()))["state"]
 

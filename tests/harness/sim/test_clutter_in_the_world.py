@@ -40,7 +40,7 @@ def test_clutter_weighs_what_its_volume_of_water_does(world: SapienWorld) -> Non
     can = SceneObject("clutter_0", "can", Pose((0.3, 0.2, 0.74)))
     scene = build_scene(*PLACE)
     world.load(replace(scene, clutter=(can,)))
-    assert 0.15 < world.loaded().components["clutter_0"].mass < 0.4  # type: ignore[attr-defined]
+    assert 0.15 < world.loaded().moving["clutter_0"].mass < 0.4  # type: ignore[attr-defined]
 
 
 def test_a_collision_is_recorded_and_the_trial_goes_on(world: SapienWorld) -> None:
