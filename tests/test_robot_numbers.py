@@ -57,7 +57,7 @@ def test_no_other_module_has_its_joints_mounts_or_reach() -> None:
     fingers = [finger.origin.position for arm in arms for finger in arm.fingers]
     mounts = [arm.base.position for arm in arms]
     sites = [(site.base, site.reach, site.tool_reach) for site in WORKCELL.arms]
-    known = telling(numbers([[joint[0] for joint in CHAIN], mounts, fingers]), 3)
+    known = telling(numbers([[joint[1] for joint in CHAIN], mounts, fingers]), 3)
     known |= telling(numbers(sites), 2) - {0.25}
     assert {0.417, 0.4195, 0.69, 0.63, 0.26396} <= known
     # sizes of things may happen to be those of a link, and other robots may have the same arm

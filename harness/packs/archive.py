@@ -14,7 +14,7 @@ import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,11 +91,6 @@ class Archive:
             )
         return self.inside(path)
 
-    def clutter(self) -> tuple[str, ...]:
-        """Things of the objaverse that lie about, as "category/id", sorted."""
-        found = (self.root / "objects" / "objaverse").glob("*/*/model.urdf")
-        return tuple(sorted(f"{path.parent.parent.name}/{path.parent.name}" for path in found))
-
 
 def read_json(path: Path, most: int) -> Any:
     """The JSON in a file of the archive; ArchiveError if it is none or has more bytes."""
@@ -168,7 +163,7 @@ def content_hash(path: Path) -> str:
             return kept
     with path.open("rb") as file:
         found = hashlib.file_digest(file, "sha256").hexdigest()
-    _write(noted_hash, lambda path: path.write_text(found, "ascii"))
+    _write(noted_hash, lambda file: file.write(found.encode()))
     return found
 
 
@@ -178,7 +173,7 @@ def cached(files: tuple[Path, ...], how: str, make: Callable[[], Arrays]) -> Pat
     entry = cache_folder() / f"{hashlib.sha256(text.encode()).hexdigest()[:40]}.npz"
     if not entry.exists():
         made = make()
-        _write(entry, lambda path: _save(path, made))
+        _write(entry, lambda file: np.savez(file, **made))  # type: ignore[arg-type]
     return entry
 
 
@@ -194,13 +189,9 @@ def load_arrays(entry: Path, *names: str) -> Arrays:
         raise ValueError(f"the cache entry {str(entry)!r} was damaged: start again") from error
 
 
-def _save(path: Path, arrays: Arrays) -> None:
-    with path.open("wb") as file:
-        np.savez(file, **arrays)  # type: ignore[arg-type]
-
-
-def _write(path: Path, fill: Callable[[Path], object]) -> None:
+def _write(path: Path, fill: Callable[[BinaryIO], object]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f"{path.name}.{os.getpid()}.part")
-    fill(partial)
+    with partial.open("wb") as file:
+        fill(file)
     partial.replace(path)

@@ -62,7 +62,13 @@ class OfficialPack:
         return digest_of(self.archive)
 
     def faults(self, tasks: Collection[str]) -> dict[str, str]:
-        return task_faults(self.archive, tasks)
+        """For each of `tasks` that cannot run the first file to blame, in a sentence."""
+        found = {}
+        for task in tasks:
+            models = (model for asset in official.needs().get(task, ()) for model in _models(asset))
+            if text := next(filter(None, (fault(self.archive, model) for model in models)), ""):
+                found[task] = text
+        return found
 
     def clutter(self, scene: Scene) -> tuple[ClutterKind, ...]:
         """What may lie about in `scene`: our kinds, as the archive's models where it has those, and
@@ -114,7 +120,7 @@ def make_model(
     drawn = np.concatenate([body.box for body in bodies])
     box = np.stack([drawn.min(axis=0), drawn.max(axis=0)])
     placing = placings.place(points, box, data, chosen, builtin)
-    placed = _placed(parts.body, placing)
+    placed = parts.body.placed(placing)
     placed_points = placing.points(points)
     return ObjectModel(
         asset=builtin.asset,
@@ -133,11 +139,6 @@ def make_model(
     )
 
 
-def _placed(body: Body, placing: Placing) -> list[Piece]:
-    """The body's pieces in our body frame [m]."""
-    return [(placing.points(corners), triangles) for corners, triangles in body.pieces]
-
-
 def _hinge(
     parts: Bodies, placing: Placing, builtin: ObjectModel, model: OfficialModel, tint: Color | None
 ) -> Hinge | None:
@@ -153,7 +154,7 @@ def _hinge(
     if length < 1e-6:
         raise ArchiveError(f"{model} has a door that turns about no axis")
     return Hinge(
-        shapes=convex_shapes(_placed(parts.door, placing)),
+        shapes=convex_shapes(parts.door.placed(placing)),
         point=vec3(placing.points(frame[None, :3, 3])[0]),
         axis=vec3(axis / length),
         upper=max(upper, -lower),
@@ -172,6 +173,10 @@ class Body:
     skin: Path
     box: Floats
     pieces: tuple[Piece, ...]
+
+    def placed(self, placing: Placing) -> list[Piece]:
+        """The pieces in our body frame [m]."""
+        return [(placing.points(corners), triangles) for corners, triangles in self.pieces]
 
 
 @dataclass(frozen=True)
@@ -388,16 +393,6 @@ def _models(asset: str) -> list[OfficialModel]:
     return list({model.name: model for model in official.official_models(asset)}.values())
 
 
-def task_faults(archive: Archive, tasks: Iterable[str]) -> dict[str, str]:
-    """For each of `tasks` that cannot run a sentence that says which file is the first to blame."""
-    found = {}
-    for task in tasks:
-        models = (model for asset in official.needs().get(task, ()) for model in _models(asset))
-        if text := next(filter(None, (fault(archive, model) for model in models)), ""):
-            found[task] = text
-    return found
-
-
 def fault(archive: Archive, model: OfficialModel) -> str:
     """What is wrong with a model, in a sentence; empty if nothing is. No mesh is read."""
     try:
@@ -465,7 +460,8 @@ def clutter_things(archive: Archive) -> Mapping[str, tuple[str, ...]]:
     if path.is_file():
         data = read_json(archive.inside(path), LARGEST_LIST)
         listed = read(_List, data, repr(str(path)), ArchiveError).list_of_items
-    for name in archive.clutter():
+    there = (archive.root / "objects" / THING).glob("*/*/model.urdf")
+    for name in sorted("/".join(path.parts[-3:-1]) for path in there):
         category, _, number = name.partition("/")
         if listed is None or number in map(str, listed.get(category, ())):
             found.setdefault(category, []).append(number)

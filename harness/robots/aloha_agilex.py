@@ -11,9 +11,9 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from robospa.geometry import Pose, Quat, Vec3, axis_rotation, multiply, yaw_rotation
+from robospa.geometry import Pose, Vec3, axis_rotation, yaw_rotation
 from robospa.harness.robots import links
-from robospa.harness.robots.embodiment import Arm, Embodiment, Joint
+from robospa.harness.robots.embodiment import Arm, Embodiment
 from robospa.harness.robots.links import Row
 from robospa.tasks.shapes import Box, Color, Cylinder, Shape
 from robospa.workcell import WORKCELL, Gripper
@@ -21,7 +21,6 @@ from robospa.workcell import WORKCELL, Gripper
 BLACK: Color = (0.028, 0.028, 0.032)
 DARK: Color = (0.07, 0.07, 0.08)
 STEEL: Color = (0.36, 0.37, 0.39)
-RED: Color = (0.45, 0.03, 0.03)
 
 WORKING = (
     (-math.pi, math.pi),
@@ -83,12 +82,12 @@ LINK_SHAPES: tuple[tuple[Shape, ...], ...] = (
         links.bar((0.05, -0.045), (0.246, -0.06), (0.034, 0.027), 0.03, BLACK),
         links.bar((0.085, -0.0485), (0.19, -0.0565), (0.012, 0.011), 0.0325, DARK),
         links.pin((0.246, 0, -0.06), 0.02, 0.038, STEEL),
-        links.solid((0.12, 0, -0.045), (0.125, 0.03, 0.026), 0.18),
+        links.block((0.12, 0, -0.045), (0.125, 0.03, 0.026), axis_rotation((0, 1, 0), 0.18)),
     ),
     (
         links.bar((0.0, 0.0), (0.06, -0.055), (0.0175, 0.03), 0.027, DARK),
         links.box((0.0677, 0.0015, -0.082), (0.024, 0.024, 0.005), STEEL),
-        links.solid((0.045, 0, -0.035), (0.042, 0.028, 0.026), 0.7),
+        links.block((0.045, 0, -0.035), (0.042, 0.028, 0.026), axis_rotation((0, 1, 0), 0.7)),
     ),
     (
         links.drawn(Shape(Cylinder(0.0295, 0.0515), Pose((0, 0, 0.0565)), BLACK)),
@@ -102,7 +101,7 @@ LINK_SHAPES: tuple[tuple[Shape, ...], ...] = (
         # bracket and housing of the wrist camera, behind its optical centre
         links.box((0.045, 0.02, 0.042), (0.003, 0.012, 0.018), STEEL),
         links.box((0.056, 0.02, 0.0645), (0.006, 0.042, 0.011), DARK, 0.4),
-        links.solid((0.03, 0, 0), (0.03, 0.045, 0.026)),
+        links.block((0.03, 0, 0), (0.03, 0.045, 0.026)),
     ),
 )
 """Base link and links 1 to 6."""
@@ -131,28 +130,26 @@ STAND_SHAPES: tuple[Shape, ...] = (
 )
 
 
-PI = math.pi
-FLIP = axis_rotation((1, 0, 0), -3.1416)
-LEVEL = (1.0, 0.0, 0.0, 0.0)
-
-OPEN = 10.0
-"""Joint limit [rad] of the official description: none."""
+OPEN = (-10.0, 10.0)
+"""Joint limits [rad] of the official description: none."""
 SKEW = 0.015928
 """Turn [rad] of the forearm about the upright axis in the official description; the wrist takes it
 back."""
 
-# (origin xyz, origin rotation, axis) of joints 1 to 6
-CHAIN: tuple[tuple[Vec3, Quat, Vec3], ...] = (
-    ((0.0, 0.0, 0.058), LEVEL, (0, 0, 1)),
-    ((0.025013, 0.00060169, 0.042), LEVEL, (0, 1, 0)),
-    ((-0.26396, 0.0044548, 0.0), multiply(yaw_rotation(-SKEW), FLIP), (0, 1, 0)),
-    ((0.246, -0.00025, -0.06), LEVEL, (0, 1, 0)),
-    ((0.06775, 0.0015, -0.0855), yaw_rotation(-SKEW), (0, 0, 1)),
-    ((0.03095, 0.0, 0.0855), FLIP, (1, 0, 0)),
+CHAIN: tuple[Row, ...] = (
+    ("joint1", (0.0, 0.0, 0.058), (0.0, 0.0, 0.0), (0, 0, 1), OPEN),
+    ("joint2", (0.025013, 0.00060169, 0.042), (0.0, 0.0, 0.0), (0, 1, 0), OPEN),
+    ("joint3", (-0.26396, 0.0044548, 0.0), (-3.1416, 0.0, -SKEW), (0, 1, 0), OPEN),
+    ("joint4", (0.246, -0.00025, -0.06), (0.0, 0.0, 0.0), (0, 1, 0), OPEN),
+    ("joint5", (0.06775, 0.0015, -0.0855), (0.0, 0.0, -SKEW), (0, 0, 1), OPEN),
+    ("joint6", (0.03095, 0.0, 0.0855), (-3.1416, 0.0, 0.0), (1, 0, 0), OPEN),
 )
-FINGER_TRAVEL = 0.04765
+FINGERS = (
+    ("joint7", (0.08457, 0.02449, -0.0001), 1.0),
+    ("joint8", (0.08457, -0.0245, -0.0001), -1.0),
+)
 
-ROOT = Pose((0.0, -0.65, 0.0), yaw_rotation(PI / 2))
+ROOT = Pose((0.0, -0.65, 0.0), yaw_rotation(math.pi / 2))
 """Where the robot stands in the world."""
 
 
@@ -165,28 +162,15 @@ COMMON: dict[str, Any] = {
 
 def _arm(name: str, prefix: str, base: Vec3, yaw: float) -> Arm:
     """An arm whose base stands at `base` [m] of the robot's frame, turned by `yaw` [rad]."""
-    names = [f"{prefix}_base_link", *(f"{prefix}_link{i}" for i in range(1, 9))]
-    joints = tuple(
-        Joint(f"{prefix}_joint{i + 1}", names[i], names[i + 1], Pose(xyz, rot), axis, -OPEN, OPEN)
-        for i, (xyz, rot, axis) in enumerate(CHAIN)
-    )
-    fingers = []
-    for i, y in (7, 0.02449), (8, -0.0245):
-        frame, axis = Pose((0.08457, y, -0.0001)), (0.0, math.copysign(1.0, y), 0.0)
-        limits = (0.0, FINGER_TRAVEL)
-        fingers.append(
-            Joint(f"{prefix}_joint{i}", names[6], names[i], frame, axis, *limits, "prismatic")
-        )
-    shapes = dict(zip(names, (*LINK_SHAPES, *FINGER_SHAPES), strict=True))
-    return Arm(
+    return links.serial_arm(
+        [(prefix + row[0], *row[1:]) for row in CHAIN],
+        [(prefix + row[0], *row[1:]) for row in FINGERS],
+        (0.0, 0.04765),
+        (*LINK_SHAPES, *FINGER_SHAPES),
+        names=[f"{prefix}base_link", *(f"{prefix}link{i}" for i in range(1, 9))],
         name=name,
         base=ROOT * Pose(base, yaw_rotation(yaw)),
-        base_link=names[0],
-        joints=joints,
-        fingers=tuple(fingers),
         gripper=GRIPPER,
-        tool=Pose((0.0, 0.0, 0.0)),
-        shapes=shapes,
         camera=WRIST_CAMERA,
         **COMMON,
     )
@@ -195,8 +179,8 @@ def _arm(name: str, prefix: str, base: Vec3, yaw: float) -> Arm:
 ALOHA_AGILEX = Embodiment(
     name="aloha-agilex",
     arms=(
-        _arm("left", "fl", (0.2305, 0.297, 0.782), 0.02),
-        _arm("right", "fr", (0.2315, -0.3063, 0.781), 0.01),
+        _arm("left", "fl_", (0.2305, 0.297, 0.782), 0.02),
+        _arm("right", "fr_", (0.2315, -0.3063, 0.781), 0.01),
     ),
     cameras={"head": WORKCELL.head, "front": links.FRONT, "third": links.THIRD},
     body=STAND_SHAPES,
@@ -213,14 +197,13 @@ X5_LINK_SHAPES: tuple[tuple[Shape, ...], ...] = (
 )
 X5_DISTANCE = 0.6
 """Between the bases of ARX-X5, as its official maintainers name it [m]."""
-X5_OPEN = (-OPEN, OPEN)
 
 X5_CHAIN: tuple[Row, ...] = (
-    ("joint1", (0.0, 0.0, 0.0605), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), X5_OPEN),
-    ("joint2", (0.02, 0.0, 0.04), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), X5_OPEN),
-    ("joint3", (-0.264, 0.0, 0.0), (3.1416, 0.0, 0.0), (0.0, 1.0, 0.0), X5_OPEN),
-    ("joint4", (0.245, 0.0, -0.056), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), X5_OPEN),
-    ("joint5", (0.06775, 0.0005, -0.0865), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), X5_OPEN),
+    ("joint1", (0.0, 0.0, 0.0605), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), OPEN),
+    ("joint2", (0.02, 0.0, 0.04), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), OPEN),
+    ("joint3", (-0.264, 0.0, 0.0), (3.1416, 0.0, 0.0), (0.0, 1.0, 0.0), OPEN),
+    ("joint4", (0.245, 0.0, -0.056), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), OPEN),
+    ("joint5", (0.06775, 0.0005, -0.0865), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), OPEN),
     ("joint6", (0.02895, 0.0, 0.0865), (-3.1416, 0.0, 0.0), (1.0, 0.0, 0.0), (-3.14, 3.14)),
 )
 X5_FINGERS = (
@@ -236,16 +219,11 @@ def _x5_arm(name: str, x: float) -> Arm:
         (0.0, 0.044),
         (*X5_LINK_SHAPES, *FINGER_SHAPES),
         name=name,
-        base=Pose((x, -0.35, 0.784), yaw_rotation(PI / 2)),
+        base=Pose((x, -0.35, 0.784), yaw_rotation(math.pi / 2)),
         gripper=replace(GRIPPER, fingertip=0.0375),
         camera=Pose((0.0845, 0.0, 0.05), axis_rotation((0, 1, 0), 0.349)),
         **COMMON,
     )
 
 
-ARX_X5 = Embodiment(
-    name="ARX-X5",
-    arms=(_x5_arm("left", -X5_DISTANCE / 2), _x5_arm("right", X5_DISTANCE / 2)),
-    cameras=links.SINGLE_ARM_CAMERAS,
-    distance=X5_DISTANCE,
-)
+ARX_X5 = links.two_arms("ARX-X5", X5_DISTANCE, _x5_arm)

@@ -8,7 +8,7 @@ import math
 
 from robospa.geometry import Pose, Vec3, look_rotation, yaw_rotation
 from robospa.harness.robots import links
-from robospa.harness.robots.embodiment import Arm, Embodiment
+from robospa.harness.robots.embodiment import Arm
 from robospa.harness.robots.links import DARK, STEEL
 from robospa.tasks.objects.meshes import loft, rounded_rectangle
 from robospa.tasks.shapes import Box, Color, Shape
@@ -73,14 +73,14 @@ LINK_SHAPES: tuple[tuple[Shape, ...], ...] = (
         links.shell((0.0, 0.0, -0.2646), (0.0, 0.0, -0.11), 0.054, WHITE),
         links.shell((0.0, 0.03, -0.20), (0.0, 0.075, 0.02), 0.042, WHITE, 1.0),
         *_housing((0.0, -0.05, 0.0), (0.0, 0.13, 0.0), 0.049),
-        links.block(Pose((0.0, 0.03, -0.12)), (0.05, 0.06, 0.14)),
+        links.block((0.0, 0.03, -0.12), (0.05, 0.06, 0.14)),
     ),
     (
         links.shell((0.0, 0.0, -0.044), (0.0, 0.0, 0.056), 0.048, WHITE),
         links.shell((-0.02, 0.0, 0.0), (0.11, 0.0, 0.0), 0.042, WHITE, 0.9),
         *_housing((0.088, -0.05, 0.0), (0.088, 0.082, 0.0), 0.044),
         links.rod((0.088, -0.060, 0.0), (0.088, -0.047, 0.0), 0.0455, DARK),
-        links.block(Pose((0.045, 0.015, 0.0)), (0.085, 0.06, 0.045)),
+        links.block((0.045, 0.015, 0.0), (0.085, 0.06, 0.045)),
     ),
     (
         links.shell((0.0, 0.0, 0.045), (0.0, 0.0, 0.092), 0.043, WHITE),
@@ -89,7 +89,7 @@ LINK_SHAPES: tuple[tuple[Shape, ...], ...] = (
         links.drawn(Shape(Box((0.004, 0.09, 0.012)), Pose((0.0, 0.0, 0.171), HAND), DARK)),
         # housing of the wrist camera, behind its optical centre
         links.drawn(Shape(Box((0.012, 0.03, 0.012)), Pose((0.011, -0.039, 0.112), HAND), DARK)),
-        links.block(Pose((0.0, 0.0, 0.14), HAND), (0.033, 0.102, 0.0315)),
+        links.block((0.0, 0.0, 0.14), (0.033, 0.102, 0.0315), HAND),
     ),
 )
 """Base link and links 1 to 7."""
@@ -171,9 +171,4 @@ def _arm(name: str, x: float) -> Arm:
     )
 
 
-FRANKA_PANDA = Embodiment(
-    name="franka-panda",
-    arms=(_arm("left", -DISTANCE / 2), _arm("right", DISTANCE / 2)),
-    cameras=links.SINGLE_ARM_CAMERAS,
-    distance=DISTANCE,
-)
+FRANKA_PANDA = links.two_arms("franka-panda", DISTANCE, _arm)

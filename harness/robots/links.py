@@ -1,12 +1,12 @@
 """Of what robots are made: shapes of links, joints as descriptions write them, fixed cameras."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 from robospa.geometry import Pose, Quat, Vec3, axis_rotation, look_rotation, multiply, yaw_rotation
-from robospa.harness.robots.embodiment import Arm, Joint
+from robospa.harness.robots.embodiment import Arm, Embodiment, Joint
 from robospa.tasks.objects.meshes import lathe
 from robospa.tasks.shapes import Box, Color, Cylinder, Mesh, Shape
 from robospa.workcell import WORKCELL, FixedCamera
@@ -14,18 +14,12 @@ from robospa.workcell import WORKCELL, FixedCamera
 ALONG_Y = axis_rotation((1, 0, 0), math.pi / 2)
 ALONG_X = axis_rotation((0, 1, 0), math.pi / 2)
 """Rotations that bring a cylinder's axis, z, along y and along x."""
-HERE = Pose()
+HERE, LEVEL = Pose(), Pose().rotation
 ARC = 7
 """Corners of a drawn half circle."""
 ROUND, EDGE = 16, 2
 """Sides of a shell, and steps of its rounded edge."""
 AXES: tuple[Vec3, Vec3, Vec3] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-
-
-def solid(centre: Vec3, half: Vec3, pitch: float = 0.0) -> Shape:
-    """A box that collides and is not drawn."""
-    pose = Pose(centre, axis_rotation((0, 1, 0), pitch))
-    return Shape(Box(half), pose, visual=False)
 
 
 def drawn(shape: Shape) -> Shape:
@@ -118,9 +112,9 @@ def _along(start: Vec3, end: Vec3) -> tuple[Pose, float]:
     return turn * Pose(rotation=ALONG_X), math.sqrt(sum(v * v for v in along)) / 2
 
 
-def block(pose: Pose, half: Vec3) -> Shape:
-    """A box anywhere in the link that collides and is not drawn."""
-    return Shape(Box(half), pose, visual=False)
+def block(centre: Vec3, half: Vec3, rotation: Quat = LEVEL) -> Shape:
+    """A box that collides and is not drawn."""
+    return Shape(Box(half), Pose(centre, rotation), visual=False)
 
 
 Row = tuple[str, Vec3, Vec3, Vec3, tuple[float, float]]
@@ -139,28 +133,28 @@ def serial_arm(
     limits: tuple[float, float],
     shapes: Sequence[tuple[Shape, ...]],
     tool: Pose = HERE,
+    names: Sequence[str] = (),
     **more: Any,
 ) -> Arm:
-    """An arm whose links are link0, the base, to link6 or link7; `more` is the rest of it.
+    """An arm whose links are called `names`, those of fingers last, or link0, the base, to link6 or
+    link7, finger1 and finger2; `more` is the rest of it.
 
     `fingers` are name, origin [m] in the last link and side: they slide away from the middle, by
     `limits` [m], and their frames are turned like the end-effector frame, `tool` in the last link:
     x approaches; a finger of side 1.0 slides along y, one of -1.0 against it.
     """
+    link = names or [*(f"link{i}" for i in range(len(rows) + 1)), "finger1", "finger2"]
     joints = tuple(
-        Joint(name, f"link{i}", f"link{i + 1}", Pose(xyz, rpy_rotation(*rpy)), axis, low, high)
+        Joint(name, link[i], link[i + 1], Pose(xyz, rpy_rotation(*rpy)), axis, low, high)
         for i, (name, xyz, rpy, axis, (low, high)) in enumerate(rows)
     )
     sliding = []
-    for i, (name, origin, side) in enumerate(fingers, 1):
-        frame, axis = Pose(origin, tool.rotation), (0.0, math.copysign(1.0, side), 0.0)
-        sliding.append(
-            Joint(name, joints[-1].child, f"finger{i}", frame, axis, *limits, "prismatic")
-        )
-    base = joints[0].parent
-    named = dict(zip((base, *(j.child for j in (*joints, *sliding))), shapes, strict=True))
+    for child, (name, origin, side) in zip(link[-2:], fingers, strict=True):
+        frame, axis = Pose(origin, tool.rotation), (0.0, side, 0.0)
+        sliding.append(Joint(name, joints[-1].child, child, frame, axis, *limits, "prismatic"))
+    named = dict(zip(link, shapes, strict=True))
     return Arm(
-        base_link=base, joints=joints, fingers=tuple(sliding), tool=tool, shapes=named, **more
+        base_link=link[0], joints=joints, fingers=tuple(sliding), tool=tool, shapes=named, **more
     )
 
 
@@ -172,5 +166,12 @@ THIRD = FixedCamera((0.0, 0.23, 1.33), (0, -1, -1.02), (1, 0, 0), math.radians(9
 DARK: Color = (0.05, 0.05, 0.055)
 STEEL: Color = (0.36, 0.37, 0.39)
 
-SINGLE_ARM_CAMERAS: Mapping[str, FixedCamera] = {"head": WORKCELL.head, "third": THIRD}
-"""Of a robot made of two single arms."""
+
+def two_arms(name: str, distance: float, arm: Callable[[str, float], Arm]) -> Embodiment:
+    """A robot made of two single arms: `arm` makes the one of that name with its base at x [m]."""
+    return Embodiment(
+        name=name,
+        arms=(arm("left", -distance / 2), arm("right", distance / 2)),
+        cameras={"head": WORKCELL.head, "third": THIRD},
+        distance=distance,
+    )

@@ -8,7 +8,7 @@ import math
 
 from robospa.geometry import Pose, Vec3, look_rotation, yaw_rotation
 from robospa.harness.robots import links
-from robospa.harness.robots.embodiment import Arm, Embodiment
+from robospa.harness.robots.embodiment import Arm
 from robospa.harness.robots.links import DARK, STEEL
 from robospa.tasks.shapes import Box, Color, Shape
 from robospa.workcell import Gripper
@@ -49,13 +49,13 @@ LINK_SHAPES: tuple[tuple[Shape, ...], ...] = (
         *_joint((0.0, 0.0, -0.040), (0.0, 0.0, 0.040), 0.032),
         links.shell((0.0, 0.0, 0.0), FORE_END, 0.028, WHITE),
         links.rod(ALONG_FORE[0], ALONG_FORE[1], 0.0290, DARK),
-        links.block(Pose((-0.12, 0.034, 0.0), yaw_rotation(FORE_HEADING)), (0.12, 0.028, 0.03)),
+        links.block((-0.12, 0.034, 0.0), (0.12, 0.028, 0.03), yaw_rotation(FORE_HEADING)),
     ),
     _joint((0.0, 0.0, -0.036), (0.0, 0.0, 0.0285), 0.031),
     (
         links.shell((0.0, -0.02, 0.0), (0.0, 0.078, 0.0), 0.029, WHITE),
         links.rod((0.0, 0.076, 0.0), (0.0, 0.091, 0.0), 0.030, DARK),
-        links.block(Pose((0.0, 0.035, 0.0)), (0.028, 0.052, 0.028)),
+        links.block((0.0, 0.035, 0.0), (0.028, 0.052, 0.028)),
     ),
     (
         links.rod((0.0, 0.0, 0.0), (0.0, 0.0, 0.02), 0.03, DARK),
@@ -64,7 +64,7 @@ LINK_SHAPES: tuple[tuple[Shape, ...], ...] = (
         links.box((0.0, 0.0, 0.034), (0.0275, 0.030, 0.012), STEEL),
         # housing of the wrist camera, behind its optical centre
         links.box((-0.05, 0.02, 0.028), (0.012, 0.042, 0.01), DARK, 0.46),
-        links.block(Pose((0.0, 0.0, 0.0335)), (0.03, 0.0725, 0.0335)),
+        links.block((0.0, 0.0, 0.0335), (0.03, 0.0725, 0.0335)),
     ),
 )
 """Base link and links 1 to 6."""
@@ -140,9 +140,4 @@ def _arm(name: str, x: float) -> Arm:
     )
 
 
-PIPER = Embodiment(
-    name="piper",
-    arms=(_arm("left", -DISTANCE / 2), _arm("right", DISTANCE / 2)),
-    cameras=links.SINGLE_ARM_CAMERAS,
-    distance=DISTANCE,
-)
+PIPER = links.two_arms("piper", DISTANCE, _arm)

@@ -8,7 +8,7 @@ maintainers name for this robot. The description counts a finger's travel from -
 
 from robospa.geometry import Pose, Vec3, look_rotation
 from robospa.harness.robots import links
-from robospa.harness.robots.embodiment import Arm, Embodiment
+from robospa.harness.robots.embodiment import Arm
 from robospa.harness.robots.links import DARK, STEEL
 from robospa.tasks.shapes import Box, Color, Shape
 from robospa.workcell import Gripper
@@ -56,14 +56,14 @@ LINK_SHAPES: tuple[tuple[Shape, ...], ...] = (
         links.rod((0.0, 0.0, 0.325), (0.0, 0.0, 0.336), 0.0395, STEEL),
         links.shell((0.0, -0.05, 0.392), (0.0, 0.047, 0.392), 0.040, GREY),
         *_cap((0.0, -0.048, 0.392), (0.0, -0.066, 0.392), 0.039),
-        links.block(Pose((0.0, 0.0, 0.2)), (0.038, 0.038, 0.23)),
+        links.block((0.0, 0.0, 0.2), (0.038, 0.038, 0.23)),
     ),
     (
         links.shell((0.0, 0.0475, 0.0), (0.0, 0.13, 0.0), 0.039, GREY),
         *_cap((0.0, 0.128, 0.0), (0.0, 0.144, 0.0), 0.038),
         links.rod((0.0, 0.0465, 0.0), (0.0, 0.051, 0.0), 0.040, DARK),
         links.shell((0.0, 0.09, -0.057), (0.0, 0.09, 0.0475), 0.038, GREY),
-        links.block(Pose((0.0, 0.09, -0.005)), (0.037, 0.042, 0.05)),
+        links.block((0.0, 0.09, -0.005), (0.037, 0.042, 0.05)),
     ),
     (
         links.shell((0.0, 0.0, 0.049), (0.0, 0.0, 0.133), 0.039, GREY),
@@ -71,7 +71,7 @@ LINK_SHAPES: tuple[tuple[Shape, ...], ...] = (
         *_cap((0.0, 0.0, 0.131), (0.0, 0.0, 0.147), 0.038),
         links.shell((0.0, -0.057, 0.0913), (0.0, 0.0475, 0.0913), 0.038, GREY),
         *_cap((0.0, -0.055, 0.0913), (0.0, -0.070, 0.0913), 0.037),
-        links.block(Pose((0.0, -0.005, 0.0913)), (0.037, 0.05, 0.042)),
+        links.block((0.0, -0.005, 0.0913), (0.037, 0.05, 0.042)),
     ),
     (
         links.rod((0.0, 0.047, 0.0), (0.0, 0.082, 0.0), 0.0375, GREY),
@@ -80,7 +80,7 @@ LINK_SHAPES: tuple[tuple[Shape, ...], ...] = (
         # housing of the wrist camera, behind its optical centre
         links.box((0.0, 0.092, 0.072), (0.045, 0.012, 0.0125), STEEL),
         links.box((0.0, 0.088, 0.045), (0.012, 0.005, 0.02), STEEL),
-        links.block(Pose((0.0, 0.1195, 0.0)), (0.073, 0.037, 0.025)),
+        links.block((0.0, 0.1195, 0.0), (0.073, 0.037, 0.025)),
     ),
 )
 """Links 1 to 6; the last one carries the gripper."""
@@ -146,7 +146,8 @@ SEEDS = (
 )
 
 
-def _arm(name: str, x: float, height: float) -> Arm:
+def _arm(name: str, x: float) -> Arm:
+    height = 0.65 if x < 0 else 0.75
     return links.serial_arm(
         CHAIN,
         FINGERS,
@@ -163,9 +164,4 @@ def _arm(name: str, x: float, height: float) -> Arm:
     )
 
 
-UR5_WSG = Embodiment(
-    name="ur5-wsg",
-    arms=(_arm("left", -DISTANCE / 2, 0.65), _arm("right", DISTANCE / 2, 0.75)),
-    cameras=links.SINGLE_ARM_CAMERAS,
-    distance=DISTANCE,
-)
+UR5_WSG = links.two_arms("ur5-wsg", DISTANCE, _arm)

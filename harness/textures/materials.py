@@ -16,8 +16,7 @@ def _grain(draw: f.Draw, along: f.Field, across: f.Field, rings: float) -> f.Fie
     """Rings 0..1 that run along one direction, with pores; `across` in boards' widths."""
     bend = f.noise(draw, 2, 3, 3) if along is f.X else f.noise(draw, 3, 2, 3)
     fine = f.noise(draw, 5, 90, 2) if along is f.X else f.noise(draw, 90, 5, 2)
-    ring = (across + bend * 0.22) * (rings)
-    _, saw = f.cell(ring)
+    _, saw = f.cell((across + bend * 0.22) * rings)
     lines = np.where(saw < 0.8, saw * 1.25, (1 - saw) * 5)
     result: f.Field = 0.5 * lines + 0.5 * fine
     return result
@@ -41,15 +40,13 @@ def boards(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Boards side by side, each with its own tone; in styles 2 and 3 with butt joints."""
     along, across = (f.X, f.Y) if style % 2 == 0 else (f.Y, f.X)
     count = draw.whole(5, 11)
-    place = across * count
-    board, part = f.cell(place)
+    board, part = f.cell(across * count)
     edge = np.minimum(part, 1 - part)
     seam = f.smooth(edge / 0.03 - 0.2)
     if style >= 2:
         start = f.each(draw, board)
         length = draw.number(1.6, 2.6)
-        run = along * length + start * 3
-        piece, part = f.cell(run)
+        piece, part = f.cell(along * length + start * 3)
         end = np.minimum(part, 1 - part) / length * count
         seam = seam * f.smooth(end / 0.03 - 0.2)
         board = board * 31 + piece
@@ -64,11 +61,9 @@ def parquet(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Basket weave of short strips, or a chequer of turned squares."""
     count = draw.whole(5, 10)
     strips = draw.whole(3, 5)
-    x, y = f.X * count, f.Y * count
-    (i, v), (j, u) = f.cell(y), f.cell(x)
+    (i, v), (j, u) = f.cell(f.Y * count), f.cell(f.X * count)
     flat = (i + j) % 2 == 0
-    across = np.where(flat, v, u) * strips
-    strip, part = f.cell(across)
+    strip, part = f.cell(np.where(flat, v, u) * strips)
     edge = np.minimum(part, 1 - part) / strips
     ends = np.minimum(np.minimum(u, 1 - u), np.minimum(v, 1 - v))
     seam = f.smooth(np.minimum(edge, ends) / 0.02)
@@ -129,8 +124,7 @@ def twill(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     count = draw.whole(34, 52)
     y = f.Y * count
     if style % 2:
-        column = f.X * draw.whole(6, 12)
-        folded = np.abs(f.cell(column)[1] - 0.5) * (count / 6)
+        folded = np.abs(f.cell(f.X * draw.whole(6, 12))[1] - 0.5) * (count / 6)
         line = f.wave(folded + y * 0.6)
     else:
         line = f.wave(f.X * count + y)
@@ -164,21 +158,17 @@ def gingham(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Checks of white and one colour; thin window-pane lines in odd styles."""
     count = draw.whole(8, 18)
     wide = 0.5 if style % 2 == 0 else draw.number(0.1, 0.16)
-    x, y = f.X * count, f.Y * count
-    across = (f.cell(x)[1] < wide).astype(np.float32)
-    down = (f.cell(y)[1] < wide).astype(np.float32)
-    share = (across + down) * 0.5
-    picture = f.mix(f.filled("f4f2ec"), f.rgb(colors[0]), share)
+    across = (f.cell(f.X * count)[1] < wide).astype(np.float32)
+    down = (f.cell(f.Y * count)[1] < wide).astype(np.float32)
+    picture = f.mix(f.filled("f4f2ec"), f.rgb(colors[0]), (across + down) * 0.5)
     return f.shaded(picture, _threads(draw))
 
 
 def knit(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Rows of V-shaped stitches; in odd styles with bands of a second wool."""
     columns, rows = draw.whole(22, 32), draw.whole(26, 38)
-    x = f.X * columns
-    u = np.abs(f.cell(x)[1] - 0.5)
-    y = f.Y * rows + u * 1.6
-    row, v = f.cell(y)
+    u = np.abs(f.cell(f.X * columns)[1] - 0.5)
+    row, v = f.cell(f.Y * rows + u * 1.6)
     v = np.abs(v - 0.5)
     wool = f.smooth((0.5 - v) * 5) * f.smooth((0.5 - u) * 9 + 0.2) * (0.6 + 0.4 * f.smooth(u * 9))
     picture = f.ramp(0.5 * f.each(draw, row) + 0.5 * f.noise(draw, 40, 40, 2), colors)
@@ -242,18 +232,16 @@ def granite(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Grains of three tones; coarse in odd styles."""
     across = draw.whole(70, 90) if style % 2 == 0 else draw.whole(38, 55)
     grains = f.Cells(draw, across, across)
-    tone = f.each(draw, grains.number)
-    t = 0.75 * tone + 0.25 * f.noise(draw, 5, 5, 3)
+    t = 0.75 * f.each(draw, grains.number) + 0.25 * f.noise(draw, 5, 5, 3)
     return f.ramp(t, colors)
 
 
 def terrazzo(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Chips of stone in a plain ground, small or large."""
-    ground = draw.pick(GROUNDS)
-    picture = f.shaded(f.filled(ground), 0.96 + 0.06 * f.noise(draw, 40, 40, 2))
+    picture = f.shaded(f.filled(draw.pick(GROUNDS)), 0.96 + 0.06 * f.noise(draw, 40, 40, 2))
     for across, share in ((36, 0.55), (18, 0.5)) if style % 2 == 0 else ((22, 0.6), (12, 0.55)):
         chips = f.Cells(draw, across, across)
-        there = f.each(draw, chips.number) < (share)
+        there = f.each(draw, chips.number) < share
         size = 0.12 + f.each(draw, chips.number) * 0.25
         inside = f.smooth((chips.seam - size) * 8) * there
         tone = f.ramp(f.each(draw, chips.number), colors)
@@ -309,8 +297,7 @@ GROUTS = ("d8d4cc", "b9b5ae", "8c8984", "efece6", "5c5a57")
 
 def _edge(x: f.Field, y: f.Field, wide: float) -> f.Field:
     """Distance from a tile's edge, in units of the shorter side; `wide` is length over height."""
-    u, v = np.minimum(x, 1 - x) * (wide), np.minimum(y, 1 - y)
-    return np.minimum(u, v)
+    return np.minimum(np.minimum(x, 1 - x) * wide, np.minimum(y, 1 - y))
 
 
 def _laid(draw: f.Draw, tile: f.Picture, edge: f.Field, joint: float) -> f.Picture:
@@ -319,8 +306,8 @@ def _laid(draw: f.Draw, tile: f.Picture, edge: f.Field, joint: float) -> f.Pictu
         np.broadcast_to(f.rgb(draw.pick(GROUTS)), tile.shape),
         0.9 + 0.15 * f.noise(draw, 80, 80, 1),
     )
-    face = f.smooth((edge - (joint)) * 30)
-    bevel = 0.86 + 0.14 * f.smooth((edge - (joint)) * 9)
+    face = f.smooth((edge - joint) * 30)
+    bevel = 0.86 + 0.14 * f.smooth((edge - joint) * 9)
     return f.mix(ground, f.shaded(tile, bevel), face)
 
 
@@ -371,17 +358,14 @@ def hexagons(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     root = 1.7320508
     x, y = f.X * count, f.Y * count
     best, number = np.full_like(f.X, 9), np.zeros(f.X.shape, np.int32)
-    for shift in (0.0, 0.5):  # hexagons are the cells of two interlaced grids
-        h = shift
+    for h in (0.0, 0.5):  # hexagons are the cells of two interlaced grids
         j, i = np.floor(x - h + 0.5), np.floor((y / root) - h + 0.5)
         dx, dy = x - (j + h), y - (i + h) * root
         gap = np.maximum(np.abs(dx), 0.5 * np.abs(dx) + 0.8660254 * np.abs(dy))
         nearer = gap < best
         best = np.minimum(best, gap)
-        index = ((i * 2 + shift * 2) * 64 + j).astype(np.int32)
-        number = np.where(nearer, index, number)
-    tone = f.each(draw, number)
-    tile = f.ramp(0.8 * tone + 0.2 * f.noise(draw, 8, 8, 2), colors)
+        number = np.where(nearer, ((i * 2 + h * 2) * 64 + j).astype(np.int32), number)
+    tile = f.ramp(0.8 * f.each(draw, number) + 0.2 * f.noise(draw, 8, 8, 2), colors)
     if style % 2:
         dark = (f.each(draw, number) < 0.25).astype(np.float32)
         tile = f.mix(tile, f.rgb(draw.pick(GLAZES)[0]), dark)
@@ -394,8 +378,7 @@ def mosaic(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     palette = (colors[0], colors[1], second[0], colors[0], third[1])
     if style % 2 == 0:
         count = draw.whole(16, 26)
-        x, y = f.X * count, f.Y * count
-        (i, v), (j, u) = f.cell(y), f.cell(x)
+        (i, v), (j, u) = f.cell(f.Y * count), f.cell(f.X * count)
         number, edge = i * 64 + j, _edge(u, v, 1.0)
     else:
         pieces = f.Cells(draw, *(draw.whole(12, 20),) * 2)

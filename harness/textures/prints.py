@@ -95,8 +95,7 @@ def cork(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
 
 def brushed(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Brushed metal; riveted or ribbed plates in odd styles."""
-    t = 0.7 * f.noise(draw, 3, 120, 2) + 0.3 * f.noise(draw, 2, 2, 2)
-    picture = f.ramp(t, colors)
+    picture = f.ramp(0.7 * f.noise(draw, 3, 120, 2) + 0.3 * f.noise(draw, 2, 2, 2), colors)
     if style % 2:
         count = draw.whole(2, 4)
         x, y = f.X * count, f.Y * count
@@ -117,8 +116,7 @@ def ground(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
         + 0.2 * f.noise(draw, 4, 4, 3)
     )
     if style % 2:
-        ripple = f.wave(f.Y * draw.whole(7, 13) + f.noise(draw, 3, 3, 4) * 2.2)
-        t = t + 0.16 * ripple
+        t = t + 0.16 * f.wave(f.Y * draw.whole(7, 13) + f.noise(draw, 3, 3, 4) * 2.2)
     return f.ramp(t, colors)
 
 
@@ -146,8 +144,7 @@ def _ink(distance: f.Field, scale: float = SHARP) -> f.Field:
 def stripes(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Bands of two to four colours: upright, lying, or slanting."""
     x, _ = ((f.X, f.Y), (f.Y, f.X), f.turned(0.4142))[style % 3]
-    place = x * draw.whole(4, 12)
-    _, part = f.cell(place)
+    _, part = f.cell(x * draw.whole(4, 12))
     picture = f.filled(colors[0])
     for color in colors[1 : draw.whole(2, 4)]:
         start, wide = draw.number(0.0, 0.7), draw.number(0.06, 0.3)
@@ -159,8 +156,7 @@ def stripes(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
 def dots(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Spots in rows or staggered, of one or several colours; rings in style 2."""
     count = draw.whole(7, 16)
-    y = f.Y * count
-    row, v = f.cell(y)
+    row, v = f.cell(f.Y * count)
     column, u = f.cell(f.X * count + _every_other(row) * (style % 2))
     u, v = u - 0.5, v - 0.5
     radius = draw.number(0.17, 0.36)
@@ -177,8 +173,7 @@ def zigzag(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     x, y = (f.X, f.Y) if style < 2 else (f.Y, f.X)
     swing = x * draw.whole(5, 11)
     tooth = np.abs(f.cell(swing)[1] - 0.5) * 2 if style % 2 == 0 else f.wave(swing) * 0.5
-    place = y * draw.whole(7, 14) + tooth * draw.number(0.5, 1.1)
-    _, part = f.cell(place)
+    _, part = f.cell(y * draw.whole(7, 14) + tooth * draw.number(0.5, 1.1))
     picture = f.mix(f.filled(colors[0]), f.rgb(colors[1]), _ink(np.abs(part - 0.25) - 0.2, 25))
     if draw.chance(0.5):
         picture = f.mix(picture, f.rgb(colors[2]), _ink(np.abs(part - 0.72) - 0.07, 25))
@@ -189,11 +184,9 @@ def lozenges(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Argyle: diamonds of two colours, with thin lines across in odd styles."""
     a, b = (f.X * draw.number(0.9, 1.4) + f.Y), (f.X * 1.15 - f.Y)
     count = draw.whole(4, 9)
-    a, b = a * count, b * count
-    (i, u), (j, v) = f.cell(a), f.cell(b)
+    (i, u), (j, v) = f.cell(a * count), f.cell(b * count)
     inks = np.stack([f.rgb(code) for code in colors])
-    which = np.where((i + j) % 2 == 0, 0, 1 + (i % 2))
-    picture = inks[which]
+    picture = inks[np.where((i + j) % 2 == 0, 0, 1 + (i % 2))]
     if style % 2:
         line = np.minimum(np.abs(u - 0.5), np.abs(v - 0.5)) - 0.02
         picture = f.mix(picture, f.rgb(colors[3]), _ink(line, 25))
@@ -226,8 +219,7 @@ def flowers(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
         else ((draw.whole(5, 9), 0.42),)
     )
     for k, (count, radius) in enumerate(layers):
-        y = f.Y * count
-        row, v = f.cell(y)
+        row, v = f.cell(f.Y * count)
         column, u = f.cell(f.X * count + _every_other(row))
         key = row * 64 + column
         u = u - 0.5 + (f.each(draw, key) - 0.5) * 0.25
@@ -245,10 +237,9 @@ def leaves(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Leaves along stems that run up the wall, or strewn in odd styles."""
     count = draw.whole(6, 11)
     picture = f.filled(colors[0])
-    x, y = f.X * count, f.Y * count * 1.4
-    column, u = f.cell(x)
+    column, u = f.cell(f.X * count)
     u = u - 0.5 + f.wave(f.Y * 3 + f.each(draw, column)) * 0.08
-    row, v = f.cell(y + f.each(draw, column))
+    row, v = f.cell(f.Y * count * 1.4 + f.each(draw, column))
     v = v - 0.5
     if style % 2:
         key = row * 64 + column
@@ -268,8 +259,7 @@ def leaves(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
 def shapes(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Triangles, quarter circles or half circles in a grid, each in a colour of its own."""
     count = draw.whole(5, 10)
-    x, y = f.X * count, f.Y * count
-    (i, v), (j, u) = f.cell(y), f.cell(x)
+    (i, v), (j, u) = f.cell(f.Y * count), f.cell(f.X * count)
     key = i * 64 + j
     u = np.where(f.each(draw, key) < 0.5, u, 1 - u)
     v = np.where(f.each(draw, key) < 0.5, v, 1 - v)
@@ -289,8 +279,7 @@ def scales(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Overlapping fans of rings, as on Japanese cloth; filled fans in odd styles."""
     count = draw.whole(6, 11)
     picture = f.filled(colors[0])
-    y = f.Y * count * 2
-    top, down = f.cell(y)
+    top, down = f.cell(f.Y * count * 2)
     rings = 0 if style % 2 else draw.whole(2, 3)
     for back in (2, 1, 0):  # nearer rows are drawn over farther ones
         row = top - back + 1
@@ -298,8 +287,8 @@ def scales(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
         u, v = u - 0.5, (down + (back - 1)) * 0.5
         away = np.sqrt(u * u + v * v) * 2
         inside = _ink(away - 1, 12)
-        tone = f.each(draw, row * 64 + column)
-        body = f.mix(f.filled(colors[1]), f.rgb(colors[2]), (tone < 0.4).astype(np.float32))
+        other = (f.each(draw, row * 64 + column) < 0.4).astype(np.float32)
+        body = f.mix(f.filled(colors[1]), f.rgb(colors[2]), other)
         line = _ink(np.abs(away - 0.93) - 0.05, 10)
         for k in range(rings):
             line = np.maximum(line, _ink(np.abs(away - 0.93 + 0.25 * (k + 1)) - 0.05, 10))
