@@ -330,10 +330,12 @@ def fitted(cases: Sequence[AnswerSample]) -> list[ActionFault]:
     if size != other:  # what the arms have in common is not fitted to arms that differ
         return []
     found = []
-    given = np.concatenate([c.given for c in cases]).reshape(-1, 2, size + 1)[:, :, :-1]
-    recorded = np.concatenate([c.recorded for c in cases]).reshape(-1, 2, size + 1)[:, :, :-1]
-    now = np.concatenate([np.tile(c.now, (len(c.given), 1)) for c in cases])
-    now = now.reshape(-1, 2, size + 1)[:, :, :-1]
+
+    def by_arm(rows: Sequence[Array]) -> Array:
+        return np.concatenate(rows).reshape(-1, 2, size + 1)[:, :, :-1]
+
+    given, recorded = by_arm([c.given for c in cases]), by_arm([c.recorded for c in cases])
+    now = by_arm([np.tile(c.now, (len(c.given), 1)) for c in cases])
     cost = np.abs(given[..., None, :] - recorded[..., :, None]).mean(axis=(0, 1))
     cost += 0.002 * (1 - np.eye(size))
     rows = list(range(size))

@@ -52,8 +52,6 @@ MOST_TEXT = 2**22
 QUALITY = 95
 """Of a written JPEG: OpenCV's default, which the official recordings have."""
 
-NOTHING_MORE: Mapping[str, str | NDArray[np.generic]] = {}
-
 Frame = bytes | NDArray[np.uint8]
 """A picture as JPEG (official colours) or as an array (H, W, 3) RGB."""
 
@@ -267,7 +265,7 @@ def text_beside(path: Path, most: int = MOST_TEXT) -> str:
 
 
 def write_episode(
-    path: Path, episode: Episode, more: Mapping[str, str | NDArray[np.generic]] = NOTHING_MORE
+    path: Path, episode: Episode, more: Mapping[str, str | NDArray[np.generic]] | None = None
 ) -> None:
     """Write `episode`, frames as JPEG, and `more` data by name, at once or not at all."""
     h5py = _module("h5py", "h5py")
@@ -287,7 +285,7 @@ def write_episode(
             file["joint_action/measured"] = episode.measured
         for camera, frames in episode.frames.items():
             file[VIEWS[camera]] = np.array([to_jpeg(f) for f in frames], dtype="S")
-        for name, data in more.items():
+        for name, data in (more or {}).items():
             file[name] = data
     replace_file(path, stream.getvalue())
 

@@ -36,13 +36,13 @@ GAIN = 0.8
 """Share of the jump that undoing a mistake must take away for it to be named."""
 
 
-def postures(spec: PolicySpec, count: int = POSTURES) -> list[Observation]:
+def postures(spec: PolicySpec) -> list[Observation]:
     """Observations of the form of `spec`: noise, and postures that no mistake leaves the same."""
     rng = np.random.default_rng(5)
     robot = embodiment(robot_of(spec))
     space = robot.action_space("joint")
     seen = []
-    for i in range(count):
+    for i in range(POSTURES):
         observation = synthetic_observation(spec, seed=i)
         shape = (2, max(space.joints))
         joints = rng.uniform(0.25, 0.9, shape) * rng.choice([-1, 1], shape)
@@ -101,9 +101,7 @@ def _case(policy: Policy, seen: Observation) -> AnswerSample | None:
         return None
     if kind == "delta_ee":
         now = np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0], 2)
-    first = chunk[:1].copy()
-    recorded = now[None].copy()
-    return AnswerSample(space, first, recorded, now)
+    return AnswerSample(space, chunk[:1].copy(), now[None], now)
 
 
 def odd(cases: Sequence[AnswerSample], action: str = "joint") -> tuple[list[str], str]:
@@ -136,8 +134,7 @@ def odd(cases: Sequence[AnswerSample], action: str = "joint") -> tuple[list[str]
             )
     if action != "delta_ee":
         findings = judge(cases, {}, gain=GAIN)
-        grip = np.abs(given - recorded)[:, space.grippers].mean()
-        best = findings.best
+        best, grip = findings.best, np.abs(given - recorded)[:, space.grippers].mean()
         shrunk = best is not None and len(SHRINKS & {*best.names}) > 1
         if best is not None and not shrunk and (far or grip > TURNED or findings.base.score > FITS):
             found.append(f"the first action is far from the state; it looks as if {best.phrase}")

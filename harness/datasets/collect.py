@@ -312,7 +312,10 @@ def make(
             Search(key, FIRST_TRAINING_SEED, order.settings.episodes, False, store.attempts(key))
             for key in keys
         ]
-        _say_size(order, wanted, store, say)
+        whole = expected_bytes(order.settings, keys, order.images)
+        text = check_room(order.out, max(0.0, whole - store.size() / 2))
+        count = order.settings.episodes * len(keys)
+        say(f"{count} episodes of {counted(len(keys), 'variant')}: {text}")
         _make_episodes(order, wanted, store, open_pool, lambda: lock.check(order.out), say)
         result = _pack(order, wanted, store, folders, say)
         _clear(order.out, store, keep_episodes)
@@ -354,16 +357,6 @@ def _clear(out: Path, store: EpisodeStore, keep_episodes: bool) -> None:
             shutil.rmtree(store.folder)
     for path in (out / LOCK, *out.rglob(PARTIAL)):  # of one that was killed
         path.unlink(missing_ok=True)
-
-
-def _say_size(
-    order: Order, wanted: Sequence[Search], store: EpisodeStore, say: Callable[[str], None]
-) -> None:
-    keys = [search.key for search in wanted]
-    whole = expected_bytes(order.settings, keys, order.images)
-    text = check_room(order.out, max(0.0, whole - store.size() / 2))
-    episodes = order.settings.episodes * len(keys)
-    say(f"{episodes} episodes of {counted(len(keys), 'variant')}: {text}")
 
 
 def _make_episodes(

@@ -384,7 +384,7 @@ class Scene3D:
         self._playback = playback
         self._nodes: dict[str, Any] = {}
         self._boxes: dict[str, Any] = {}
-        self._labels: dict[str, Any] = {}
+        self._labels: list[Any] = []
         scene.set_up_direction("+z")
         scene.configure_default_lights(cast_shadow=False)
         for number, body in enumerate(bodies):
@@ -393,7 +393,14 @@ class Scene3D:
     def _add(self, scene: Any, path: str, body: DrawnBody) -> None:
         node = scene.add_frame(path, show_axes=False)
         for index, mesh in enumerate(body.meshes):
-            self._mesh(scene, f"{path}/{index}", mesh)
+            at = f"{path}/{index}"
+            if mesh.colors.ndim == 1:
+                color = tuple(map(int, mesh.colors))
+                scene.add_mesh_simple(at, mesh.vertices, mesh.faces, color=color)
+            else:
+                trimesh, colors = need("trimesh"), {"vertex_colors": mesh.colors}
+                made = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False, **colors)
+                scene.add_mesh_trimesh(at, made)
         if body.pose is not None:
             _place(node, body.pose)
         else:
@@ -403,9 +410,8 @@ class Scene3D:
             return
         centre, size = body.box
         top = (float(centre[0]), float(centre[1]), float(centre[2] + size[2] / 2 + 0.03))
-        self._labels[body.name] = scene.add_label(
-            f"{path}/name", name, position=top, anchor="bottom-center", font_screen_scale=0.8
-        )
+        shown: dict[str, Any] = {"anchor": "bottom-center", "font_screen_scale": 0.8}
+        self._labels.append(scene.add_label(f"{path}/name", name, position=top, **shown))
         if body.name in self._playback.subtasks:
             self._boxes[body.name] = scene.add_box(
                 f"{path}/wanted",
@@ -415,17 +421,6 @@ class Scene3D:
                 position=tuple(map(float, centre)),
                 cast_shadow=False,
             )
-
-    @staticmethod
-    def _mesh(scene: Any, path: str, mesh: DrawnMesh) -> None:
-        if mesh.colors.ndim == 1:
-            color = tuple(map(int, mesh.colors))
-            scene.add_mesh_simple(path, mesh.vertices, mesh.faces, color=color)
-            return
-        made = need("trimesh").Trimesh(
-            mesh.vertices, mesh.faces, vertex_colors=mesh.colors, process=False
-        )
-        scene.add_mesh_trimesh(path, made)
 
     def show(self, time: float) -> int:
         """Put everything where it is at `time` [s]; how many moments have passed by then."""
@@ -440,7 +435,7 @@ class Scene3D:
         return shown.happened
 
     def name_objects(self, wanted: bool) -> None:
-        for text in self._labels.values():
+        for text in self._labels:
             text.visible = wanted
 
 

@@ -30,7 +30,7 @@ from replay_fakes import (
 
 from robospa.action_space import ActionSpace
 from robospa.geometry import Pose
-from robospa.harness.convention_check.action_faults import from_pose
+from robospa.harness.convention_check.action_faults import GRIPPERS, from_pose
 from robospa.harness.convention_check.check import Findings, check_conventions
 from robospa.harness.convention_check.episodes import (
     Episode,
@@ -71,12 +71,11 @@ ANSWERS: dict[str, Change] = {
     "joints reversed": columns([5, 4, 3, 2, 1, 0, 6, 12, 11, 10, 9, 8, 7, 13]),
     "joint order": columns([1, 0, 2, 3, 5, 4, 6, 8, 7, 9, 10, 12, 11, 13]),
     "degrees": joints(np.degrees),
-    "gripper inverted": grippers(lambda g: 1 - g),
-    "gripper 0..0.1": grippers(lambda g: 0.1 * g),
-    "gripper 0..100": grippers(lambda g: 100 * g),
-    "gripper 0..255": grippers(lambda g: 255 * g),
-    "gripper -1..1": grippers(lambda g: 2 * g - 1),
-    "gripper 1..-1": grippers(lambda g: 1 - 2 * g),
+    **{
+        f"gripper {name}": grippers(lambda g, shut=shut, wide=wide: shut + (wide - shut) * g)
+        for name, (shut, wide) in GRIPPERS.items()
+        if name != "0..0.045"  # nearly 0..0.1
+    },
     "delta from the start": lambda chunk, now: joints(lambda c: c - now)(chunk, now),
     "delta from the last": lambda chunk, now: joints(lambda c: per_step(c, now))(chunk, now),
     "joint signs": joints(lambda c: c * np.where(np.isin(np.arange(14), [1, 2, 8, 9]), -1, 1)),

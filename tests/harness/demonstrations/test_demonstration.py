@@ -45,7 +45,6 @@ from robospa.tasks.snapshot import Contact
 from robospa.trial import TrialKey
 
 SEED = 930_000
-MIXED = (0.3, 0.1, 0.2)
 
 
 def key(name: str, level: int = 2, seed: int = SEED) -> TrialKey:
@@ -62,19 +61,13 @@ def test_a_stream_is_its_key_s_own() -> None:
     assert len({first(plain), first(plain, "midstate"), *others}) == 4
 
 
+@pytest.mark.parametrize("shares", [(0.3, 0.1, 0.2), (0.0, 0.0, 0.0)])
 @pytest.mark.parametrize("first", [SEED, 1_000_000, 1_234_567])
-def test_shares_are_met_by_any_run_of_seeds(first: int) -> None:
-    made = [kind_of(key("Put_Bottles_Dustbin", seed=s), MIXED) for s in range(first, first + 50)]
-    counts = Counter(kind.partition(":")[0] for kind in made)
-    assert counts["noise"] == pytest.approx(15, abs=2)
-    assert counts["mistake"] == pytest.approx(5, abs=2)
-    assert counts["midstate"] == pytest.approx(10, abs=2)
-
-
-def test_without_shares_all_are_the_expert_s() -> None:
-    assert {kind_of(key("Pick_Blocks_Size", seed=s), (0.0, 0.0, 0.0)) for s in range(30)} == {
-        "expert"
-    }
+def test_shares_are_met_by_any_run_of_seeds(first: int, shares: tuple[float, ...]) -> None:
+    keys = [key("Put_Bottles_Dustbin", seed=seed) for seed in range(first, first + 50)]
+    counts = Counter(kind_of(of, shares).partition(":")[0] for of in keys)  # type: ignore[arg-type]
+    for kind, share in zip(("noise", "mistake", "midstate"), shares, strict=True):
+        assert counts[kind] == pytest.approx(50 * share, abs=2 * (share > 0))
 
 
 def test_mistakes_are_those_that_a_scene_gives_occasion_for() -> None:
