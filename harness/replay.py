@@ -82,16 +82,6 @@ class RecordedPoint:
         return [self._call]
 
 
-def recorded_policy(
-    record: TrialRecord, actions: NDArray[np.float32], space: str
-) -> RecordedPolicy | RecordedPoint:
-    """What acts, or points, as the trial of `record` did."""
-    calls = record.diagnostics.get("calls") or [{}]
-    if calls[0].get("skill") == POINT:
-        return RecordedPoint(calls[0]["at"], CameraSpec(calls[0]["camera"], *calls[0]["size"]))
-    return RecordedPolicy(actions, space)
-
-
 class _Following:
     """A world that executes recorded joint actions in place of what it is sent."""
 
@@ -129,9 +119,14 @@ def replay(
     `joints` are joint actions to execute in their place, as an earlier run did. The record that
     they are `of` says what was pointed at where nothing was moved.
     """
+    call, *_ = (of and of.diagnostics.get("calls")) or [{}]
+    if call.get("skill") == POINT:
+        policy: Policy = RecordedPoint(call["at"], CameraSpec(call["camera"], *call["size"]))
+    else:
+        policy = RecordedPolicy(actions, space)
     return run_trial(
         world if joints is None else cast(World, _Following(world, joints)),
-        RecordedPolicy(actions, space) if of is None else recorded_policy(of, actions, space),
+        policy,
         key,
         policy_seed=policy_seed,
         recorder=recorder,

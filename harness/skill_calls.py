@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import ARMS, quantize
-from robospa.geometry import Pose, Vec3, rotate
+from robospa.geometry import Vec3, rotate
 from robospa.harness.pointing import meant
 from robospa.harness.policy_calls import PolicyCaller
 from robospa.harness.skills import Expert, SkillFailed
@@ -148,13 +148,13 @@ class SkillTrial:
         """The object drawn at `point`, or nearest to it (`meant`); for a `place`, which leaves
         out what is held, also the table."""
         scene = self.run.parts.scene
-        height, width = seen.shape
         names = [one.name for one in scene.everything]
         ground = self.run.world.view(camera).onto(*point, scene.table_top) if place else None
         usable = seen >= (TABLE if place else 0)
         if place:
             held = [names.index(name) for name in self.ws.held if name is not None]
-            if held and int(seen[_pixel(point, width, height)[::-1]]) in held:
+            column, row = (min(int(s * n), n - 1) for s, n in zip(point, seen.T.shape, strict=True))
+            if int(seen[row, column]) in held:
                 return Meant(spot=ground)
             usable &= ~np.isin(seen, held)
         found = meant(seen, point, usable)
@@ -245,7 +245,8 @@ class SkillTrial:
             raise SkillFailed("held already")
         goals = tuple(one.name for one in order.to if one.name is not None)
         arm = self._free(call.arm)
-        self.yaws[name] = _yaw(self.ws.pose(name))
+        x, y, _ = rotate(self.ws.pose(name).rotation, (1.0, 0.0, 0.0))
+        self.yaws[name] = math.atan2(y, x)
         times = call.times or 1
         if call.skill == "pick":
             return plan.Pick(name, call.lift or plan.Pick.lift, arm)
@@ -402,17 +403,6 @@ class SkillTrial:
 def _together(take: Call, put: Call) -> bool:
     """Whether the second call puts down or drops what the first one picks."""
     return put.skill in ("place", "drop") and put.arm in (None, take.arm)
-
-
-def _pixel(point: Point, width: int, height: int) -> tuple[int, int]:
-    """Column and row of a point."""
-    return min(int(point[0] * width), width - 1), min(int(point[1] * height), height - 1)
-
-
-def _yaw(pose: Pose) -> float:
-    """Turn of the x axis about the vertical [rad]."""
-    x, y, _ = rotate(pose.rotation, (1.0, 0.0, 0.0))
-    return math.atan2(y, x)
 
 
 def _feedback(error: Exception) -> str:

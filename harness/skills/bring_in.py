@@ -241,7 +241,8 @@ def hang(ws: Workspace, call: Hang) -> Steps:
         yield from ws.flush(exactly=True)  # it comes to rest in its place before it is let go
         release(ws, arm)
         yield from ws.flush()
-        if _hangs(ws.pose(call.object) * handle, peg):
+        off = np.subtract((ws.pose(call.object) * handle).position, peg.position)
+        if (np.abs(off) < (ON_PEG, ON_PEG, DROP)).all():
             return
 
 
@@ -307,12 +308,6 @@ def _far_target(
             if stop is not None and narrow.open([here, stop, way[0]]):
                 return [target], [stop, *way]
     return None
-
-
-def _hangs(handle: Pose, peg: Pose) -> bool:
-    """Whether the middle of the handle is where it comes to rest on the peg."""
-    (x, y, z), (px, py, pz) = handle.position, peg.position
-    return max(abs(x - px), abs(y - py)) < ON_PEG and abs(z - pz) < DROP
 
 
 def _path(peg: Pose, out: float) -> list[Vec3]:

@@ -56,9 +56,7 @@ class Workspace:
         self.models = {o.name: object_model(o.asset, o.params) for o in self.scene.everything}
         left, right = self.robot.arms
         self.chains = (chain_of(left), chain_of(right))
-        self.joints = [np.asarray(j, dtype=float) for j in self.snapshot.joints]
-        self.gripper = list(self.snapshot.gripper)
-        self.sent = self.row()
+        self.update_state(self.snapshot)
 
     def hand(self, arm: int) -> Gripper:
         """The gripper of an arm."""

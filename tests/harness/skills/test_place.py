@@ -36,18 +36,14 @@ def opening(asset: str, *beside: float) -> float:
     return release_opening(ws, 1, hand, hand.inverse() * held.pose, CALL)
 
 
-def test_with_nothing_near_the_gripper_opens_all_the_way() -> None:
-    assert opening("block") == 1.0
-
-
 def test_beside_a_neighbour_it_opens_less_but_lets_go() -> None:
     ws = at_home("ur5-wsg")
     value = opening("block", 0.08)
     assert ws.robot.arms[1].gripper_value(2 * HALF) < value < 1.0
 
 
-@pytest.mark.parametrize("beside", [(0.05,), (0.08, -0.05)])
-def test_where_a_neighbour_is_touched_anyway_it_opens_all_the_way(
+@pytest.mark.parametrize("beside", [(), (0.05,), (0.08, -0.05)])
+def test_with_nothing_near_or_where_it_is_touched_anyway_it_opens_all_the_way(
     beside: tuple[float, ...],
 ) -> None:
     assert opening("block", *beside) == 1.0
