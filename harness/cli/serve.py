@@ -148,22 +148,17 @@ def hosted(
     from robospa.protocol.connection_limits import ServerOptions
     from robospa.protocol.options import read_options
 
-    kind = options_class(make)
+    kind, hint = options_class(make), f"see robospa serve {policy} --show-options"
     if kind is None:
         factory = partial(make, **given)
         try:
             factory()  # one that fails should do so before anybody connects
         except TypeError as error:
-            hint = f"see robospa serve {policy} --show-options"
             raise BadOptions(f"{policy} cannot be made: {error} ({hint})") from error
-        return {
-            "policy_factory": factory,
-            "options": ServerOptions(max_connections=connections),
-        }
+        return {"policy_factory": factory, "options": ServerOptions(max_connections=connections)}
     try:
         chosen = read_options(kind, given)
     except ValueError as error:
-        hint = f"see robospa serve {policy} --show-options"
         raise BadOptions(f"{policy} cannot be served: {error} ({hint})") from error
     made = make(chosen)
     name = " ".join(["robospa", metadata.version("robospa"), policy, *_changed(chosen, made)])

@@ -32,7 +32,7 @@ from robospa.harness.running.ray_executor import RayExecutor, loopback_warnings
 from robospa.harness.running.record_store import recover_folder, remove_partial_files
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.status import Status
-from robospa.harness.running.tracking import CarefulTracker, open_tracker
+from robospa.harness.running.tracking import CarefulTracker
 from robospa.harness.running.worker import WorkerConfig, describe, load_parts
 from robospa.harness.settings import FILE, Compute, EvaluationSettings, to_toml
 from robospa.harness.trial import new_run_seed, salt_hash
@@ -258,7 +258,7 @@ def evaluate(request: Request) -> None:
                 )
             log = "none" if request.settings is None else request.settings.recording.log
             kept = to_builtins(manifest.settings)
-            tracker = CarefulTracker(open_tracker(log, folder, kept), progress.note)
+            tracker = CarefulTracker(log, folder, kept, progress.note)
             runner = Runner(config, missing, request.options, on_note=progress.note)
             runner.known = known
             runner.executor = executor

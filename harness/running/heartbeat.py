@@ -16,6 +16,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
+from dataclasses import dataclass
 from typing import Any
 
 from robospa.harness.factory import is_url
@@ -200,29 +201,29 @@ class MonitoredPolicy:
                 self._policy.close()
 
 
+@dataclass
 class HeartbeatMonitor:
-    """The driver's end: watches one attempt at a trial, on the driver's own monotonic clock."""
+    """The driver's end: watches one attempt at a trial, which last advanced at time `since` of the
+    driver's own monotonic clock; `seconds` without advancing are too many."""
 
-    def __init__(self, now: float, seconds: float) -> None:
-        """`seconds` without advancing are too many."""
-        self.seconds = seconds
-        self._since = now
-        self._count = -1
-        self._activity: Activity = "simulating"
+    since: float
+    seconds: float
+    _count: int = -1
+    _activity: Activity = "simulating"
 
     def receive(self, beat: Heartbeat, now: float) -> None:
         if beat.progress != self._count or beat.activity == "waiting":
-            self._since = now
+            self.since = now
         self._count, self._activity = beat.progress, beat.activity
 
     def extend(self, seconds: float) -> None:
         """The driver itself was stopped for `seconds`: they do not count."""
-        self._since += seconds
+        self.since += seconds
 
     @property
     def deadline(self) -> float:
         """When it is too late; infinite inside a policy of the worker's own."""
-        return float("inf") if self._activity == "in_policy" else self._since + self.seconds
+        return float("inf") if self._activity == "in_policy" else self.since + self.seconds
 
 
 class ComputeLock:

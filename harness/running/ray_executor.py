@@ -57,19 +57,20 @@ NO_HEAD_SECONDS = 10.0
 CLOSE_SECONDS = 2.0
 
 
+@dataclass(eq=False)
 class RayWorker(WorkerHandle):
     """One worker: an actor, once a node has room for it."""
 
-    def __init__(self, name: str, executor: RayExecutor) -> None:
-        self.name, self.node = name, ""
-        self.actor: Any = None
-        self.call: Any = None
-        """The call of the actor whose result is awaited."""
-        self.started = False
-        self.ready = False
-        self.inbox: list[Message] = []
-        self.ended: str | None = None
-        self._executor = executor
+    name: str
+    executor: RayExecutor
+    node: str = ""
+    actor: Any = None
+    call: Any = None
+    """The call of the actor whose result is awaited."""
+    started: bool = False
+    ready: bool = False
+    inbox: list[Message] = field(default_factory=list)
+    ended: str | None = None
 
     def send(self, command: Command) -> None:
         if self.ended is None and self.actor is not None:
@@ -93,11 +94,11 @@ class RayWorker(WorkerHandle):
     def join(self, seconds: float) -> None:
         until = time.monotonic() + seconds
         while self.ended is None and self.started and time.monotonic() < until:
-            self._executor.wait([self], until - time.monotonic())
+            self.executor.wait([self], until - time.monotonic())
 
     def close(self) -> None:
         """Give its place on the node back."""
-        self._executor.remove(self)
+        self.executor.remove(self)
 
 
 class RayExecutor(Executor):

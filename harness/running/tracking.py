@@ -76,11 +76,15 @@ class WandbTracker:
 
 
 class CarefulTracker:
-    """What is told of a run while it goes on, if it has a `tracker`: one that is left alone after
-    its first error, which `say` is told."""
+    """The tracker that the setting `log` names, if any: left alone after its first error, which
+    `say` is told. Raises MissingPackage without its package."""
 
-    def __init__(self, tracker: WandbTracker | None, say: Callable[[str], None]) -> None:
-        self._tracker, self._say = tracker, say
+    def __init__(
+        self, log: str, folder: Path, settings: Mapping[str, Any], say: Callable[[str], None]
+    ) -> None:
+        name, _, project = log.partition(":")
+        made = None if name == "none" else WandbTracker(folder, project or PROJECT, settings)
+        self._tracker, self._say = made, say
 
     def add(self, record: TrialRecord) -> None:
         self._try(lambda tracker: tracker.add(record))
@@ -100,12 +104,6 @@ class CarefulTracker:
             self._tracker = None
             reason = f"{type(error).__name__}: {error}"
             self._say(f"warning: nothing more is logged with --log, the run goes on: {reason}")
-
-
-def open_tracker(log: str, folder: Path, settings: Mapping[str, Any]) -> WandbTracker | None:
-    """The tracker that the setting `log` names; raises MissingPackage without its package."""
-    name, _, project = log.partition(":")
-    return None if name == "none" else WandbTracker(folder, project or PROJECT, settings)
 
 
 def _identity(folder: Path) -> str:

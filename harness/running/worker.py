@@ -347,21 +347,21 @@ def main(pipes: Sequence[Connection], argument: tuple[WorkerConfig, str]) -> Non
         writer.close()
 
 
+@dataclass(eq=False)
 class LocalWorker(executor.WorkerHandle):
     """One worker process and the pipe of one trial that it may hold; `spare` are those of more."""
 
-    def __init__(
-        self, process: Child, pipe: Connection, name: str, spare: Sequence[Connection] = ()
-    ) -> None:
-        self.process, self.pipe, self.name = process, pipe, name
-        self._spare = list(spare)
+    name: str
+    process: Child
+    pipe: Connection
+    spare: list[Connection] = field(default_factory=list)
 
     def another_trial(self) -> LocalWorker | None:
-        return LocalWorker(self.process, self._spare.pop(), self.name) if self._spare else None
+        return LocalWorker(self.name, self.process, self.spare.pop()) if self.spare else None
 
     def send(self, command: executor.Command) -> None:
         """Send it a command; nothing happens if it has ended. To stop it stops unused places."""
-        for pipe in [self.pipe, *(self._spare if isinstance(command, executor.Stop) else ())]:
+        for pipe in [self.pipe, *(self.spare if isinstance(command, executor.Stop) else ())]:
             with contextlib.suppress(OSError):  # it has just died, which `exit_status` reports
                 pipe.send(command)
 
@@ -400,7 +400,7 @@ class LocalExecutor(executor.Executor):
     def start(self, name: str) -> LocalWorker:
         process = Child(main, (self._config, name), name, pipes=self._concurrent_trials)
         first, *spare = process.pipes
-        return LocalWorker(process, first, name, spare)
+        return LocalWorker(name, process, first, spare)
 
     def wait(self, workers: Sequence[executor.WorkerHandle], seconds: float) -> None:
         wait([worker.pipe for worker in workers if isinstance(worker, LocalWorker)], seconds)
