@@ -56,21 +56,6 @@ class Gate:
         return Gated(self.spec)
 
 
-def test_a_server_is_evaluated_and_reported(tmp_path: Path) -> None:
-    with ServerThread(policy_factory=FakePolicy) as server:
-        process = start(eval_words(tmp_path / "run", server.url))
-        out, err = process.communicate(timeout=120)
-    assert process.returncode == 0, err
-    assert "Pick Blocks Size" in out
-    found = read_run(tmp_path / "run")
-    assert len(found.records) == 8
-    assert not found.missing
-    assert all(r.success and r.attempts == 1 for r in found.records.values())
-    assert found.manifest.policy.name == "fake"
-    assert found.manifest.about.policy.target == server.url
-    assert [p.name for p in (tmp_path / "run").glob("*.part")] == []
-
-
 @quickly
 def test_a_nonsense_answer_is_the_policys_failure(tmp_path: Path) -> None:
     folder = tmp_path / "my run"

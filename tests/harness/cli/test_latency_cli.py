@@ -9,6 +9,8 @@ from command_line import robospa
 from run_fakes import run_here
 
 from robospa.harness.running import evaluate as running
+from robospa.harness.running.runner import Runner
+from robospa.harness.running.status import TimeBreakdown
 
 WORDS = [
     "eval",
@@ -19,23 +21,14 @@ WORDS = [
 ]
 
 
-class Inline:
+class Inline(Runner):
     """In the place of the driver: one worker in this process."""
 
-    def __init__(self, config: Any, keys: Any, options: Any, **_: Any) -> None:
-        self.config, self.keys = config, keys
-        self.known: Any = {}
-        self.executor: Any = None
-        self.on_record = self.on_status = lambda _: None
-        self.times = self
-
-    def overall_shares(self) -> dict[str, float]:
-        return {}
-
-    def status(self, now: float) -> None:
+    def status(self, now: float) -> Any:
         return None
 
     def run(self) -> None:
+        self.times = TimeBreakdown()
         for record in run_here(self.config, self.keys):
             self.on_record(record)
 

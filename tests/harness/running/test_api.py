@@ -95,9 +95,6 @@ def test_a_module_and_class_and_its_settings_again(tmp_path: Path) -> None:
         (FakePolicy, {"executor": "ray"}, "executor must be local"),
         (FakePolicy, {"token": "secret"}, "token goes with policy servers"),
         ("hold", {"trails": 3}, "no setting 'trails'; did you mean trials"),
-        ("hold", {"video": "some"}, "not one of none, failures, first, all"),
-        (None, {}, "or else --policy-map"),
-        ("hold", {"policy_map": "map.json"}, "not both"),
         (FakePolicy, {"policy_map": "map.json"}, "not both"),
     ],
 )

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from fake_runs import trial_record
 from numpy.typing import NDArray
-from run_fakes import SPEC, FakePolicy, FakeWorld, KeyedPolicy, fake_config, parts, trial_keys
+from run_fakes import SPEC, FakePolicy, FakeWorld, fake_config, parts, trial_keys
 
 from robospa.harness.policy_calls import Stopwatch
 from robospa.harness.running.executor import (
@@ -422,39 +422,20 @@ def test_what_a_policy_may_have_is_passed_on_and_what_it_lacks_does_nothing() ->
     assert (plain.hello, plain.last_timing) == ({}, {})
 
 
-def go(folder: Path, policy: str, world: str) -> tuple[list[TrialRecord], list[str]]:
-    records: list[TrialRecord] = []
-    notes: list[str] = []
-    options = RunOptions(workers=1, backoff=0.01, stuck_seconds=2.5)
-    config = fake_config(folder, policy, world=world)
-    Runner(config, KEYS[:3], options, records.append, notes.append).run()
-    assert sorted(record.key for record in records) == KEYS[:3]
-    return records, notes
-
-
 def test_a_worker_stuck_in_native_code_is_ended_and_its_trial_handed_back(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mark = tmp_path / "mark"
     mark.touch()
     monkeypatch.setenv("SOAK_STUCK", str(mark))
-    records, notes = go(tmp_path / "run", "run_fakes:FakePolicy", "soak_fakes:SoakWorld")
+    records: list[TrialRecord] = []
+    notes: list[str] = []
+    options = RunOptions(workers=1, backoff=0.01, stuck_seconds=2.5)
+    config = fake_config(tmp_path / "run", world="soak_fakes:SoakWorld")
+    Runner(config, KEYS[:3], options, records.append, notes.append).run()
+    assert sorted(record.key for record in records) == KEYS[:3]
     assert sorted(r.attempts for r in records) == [1, 1, 2]
     assert len(notes) == 1 and "did not advance for 2.5 s and was killed; trying again" in notes[0]
-
-
-class Thoughtful(KeyedPolicy):
-    """Takes longer over one answer than a worker may be stuck."""
-
-    def infer(self, observation: Mapping[str, Any]) -> NDArray[np.float32]:
-        if self.seed == 100001 and observation["step"] == 0:
-            time.sleep(3.5)
-        return super().infer(observation)
-
-
-def test_a_policy_inside_the_worker_may_think_for_longer(tmp_path: Path) -> None:
-    _, notes = go(tmp_path, "test_held_trials:Thoughtful", "run_fakes:FakeWorld")
-    assert notes == []
 
 
 def test_an_exception_of_a_policy_in_this_process_is_the_policys_error() -> None:

@@ -141,13 +141,6 @@ def test_actions_survive_their_file(tmp_path: Path, joints: NDArray[np.float32] 
     np.testing.assert_equal(back.joints, joints)
 
 
-def test_a_broken_action_trace_is_named(tmp_path: Path) -> None:
-    path = tmp_path / "a.npz"
-    path.write_bytes(b"PK nonsense")
-    with pytest.raises(RunError, match="no action trace"):
-        read_trace(path)
-
-
 # ---------------------------------------------------------------- one driver per run
 
 
