@@ -12,7 +12,7 @@ from dataclasses import astuple, dataclass, replace
 
 from robospa.leaderboard.agreement import CELL_LIE, LEAST_POWER, LIE
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.card import Card, recipe_of
+from robospa.leaderboard.card import recipe_of
 from robospa.leaderboard.evidence import APART, BadgeEvidence, what_it_catches
 from robospa.leaderboard.submission import Submission, slug_of
 from robospa.leaderboard.verify import compare_scores, results_of
@@ -208,7 +208,9 @@ def entry_of(submission: Submission) -> Entry:
         ("team", card.team),
         ("licence of the weights", card.licence),
         ("parameters", short_count(card.parameters)),
-        *_recipes(card),
+        *((f"weights, {task}", f"remade by bash {script}; sha256 {point.sha256}")
+          for task, point in card.checkpoints.items()
+          if (script := recipe_of(point.reference))),
         ("training", "one checkpoint per base task" if training.tasks == "single"
          else "one checkpoint for all tasks"),
         ("training scenes", training.scenes),
@@ -237,15 +239,6 @@ def entry_of(submission: Submission) -> Entry:
         submission=submission,
         cells=tuple(evidence.reproduced.ranks) if evidence.reproduced else (),
     )
-
-
-def _recipes(card: Card) -> list[tuple[str, str]]:
-    """How weights are remade that a recipe of the repository remakes, and their hash."""
-    return [
-        (f"weights, {task}", f"remade by bash {script}; sha256 {point.sha256}")
-        for task, point in card.checkpoints.items()
-        if (script := recipe_of(point.reference))
-    ]
 
 
 def short_count(count: int) -> str:

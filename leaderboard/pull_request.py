@@ -76,26 +76,21 @@ def submitted(changes: Sequence[Change]) -> list[str]:
             f"a submission adds a folder below {HOME} and changes nothing else; this one also "
             f"changes {strange[0][:120]!a}"
         )
+    names = set[str]()
     for status, path in own:
         if status != ADDED:
             raise BundleError(
                 f"a submission only adds files; this one {STATUSES[status]} {path[:120]!a}"
             )
-    names = sorted({_name_of(path) for _, path in own})
-    for name in names:
-        check_folder(name)
-    return names
-
-
-def _name_of(path: str) -> str:
-    """The submission that one of its files belongs to; BundleError if it is none of them."""
-    place = PurePosixPath(path).relative_to(HOME).parts
-    if len(place) != 2 or not SLUG.fullmatch(place[0]) or place[1] not in HANDED_IN:
-        raise BundleError(
-            f"{path[:120]!a} is not {HOME}/NAME/{ASKED}, {BUNDLE} or {IN_REPOSITORY}, NAME "
-            "being of small letters, digits and hyphens"
-        )
-    return place[0]
+        place = PurePosixPath(path).relative_to(HOME).parts
+        if len(place) != 2 or not SLUG.fullmatch(place[0]) or place[1] not in HANDED_IN:
+            raise BundleError(
+                f"{path[:120]!a} is not {HOME}/NAME/{ASKED}, {BUNDLE} or {IN_REPOSITORY}, NAME "
+                "being of small letters, digits and hyphens"
+            )
+        check_folder(place[0])
+        names.add(place[0])
+    return sorted(names)
 
 
 def check(

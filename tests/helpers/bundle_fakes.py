@@ -104,6 +104,13 @@ class Weak(FakePolicy):
         return chunk
 
 
+class Idle(Weak):
+    """The same spec, without a single success."""
+
+    def infer(self, observation: Mapping[str, Any]) -> Any:
+        return 0 * super().infer(observation)
+
+
 def seeds_of(task: str, level: int, embodiment: str, mode: str) -> Sequence[int]:
     if task not in (PICK, PRESS) or level not in range(1, 6):
         raise LookupError(task)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bundle_fakes import PICK, REFERENCE, Weak, World
+from bundle_fakes import PICK, REFERENCE, Idle, Weak, World
 from fake_runs import run_of, trial_record
 from msgspec import to_builtins
 from msgspec.structs import replace as replaced
@@ -72,13 +72,8 @@ def test_an_honest_claim_holds_and_an_empty_one_does_not(valid: Valid) -> None:
     honest = reproduced(valid, block_of(8), Weak())
     assert honest.holds and honest.overall.fresh == 35 and honest.repeated == 0
     assert honest.bundle == valid.manifest.bundle and honest.trials == 40
-    nothing = reproduced(valid, block_of(8), _Idle())
+    nothing = reproduced(valid, block_of(8), Idle())
     assert not nothing.holds and nothing.overall.fresh == 0
-
-
-class _Idle(FakePolicy):
-    def infer(self, observation: Any) -> Any:
-        return 0 * super().infer(observation)
 
 
 def test_one_hidden_trial_earns_no_badge(valid: Valid) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from bundle_fakes import CARD_TEXT as CARD
-from bundle_fakes import FAKES, PICK, REFERENCE, SEEDS, Weak, make_run
+from bundle_fakes import FAKES, PICK, REFERENCE, SEEDS, Idle, Weak, make_run
 from command_line import Done, robospa
 from msgspec import to_builtins
 from run_fakes import FakePolicy, KeyedPolicy, other, parts
@@ -150,18 +150,11 @@ def test_a_server_that_asks_for_the_key_gets_no_hidden_scene(packed: Path, tmp_p
     assert not (tmp_path / "run").exists()
 
 
-class Worse(Weak):
-    """The same spec, without a single success."""
-
-    def infer(self, observation):  # type: ignore[no-untyped-def]
-        return 0 * super().infer(observation)
-
-
 def test_inflated_numbers_are_not_reproduced(packed: Path, tmp_path: Path) -> None:
     """6 of 8 claimed, 0 of 16 afresh: p = 2 (4/220)^2, C(4, 3) of C(12, 3) for each level."""
     bundle = packed_for_practice(packed, tmp_path / "b.zip")
     _, told = hidden_block(tmp_path, 8)
-    with ServerThread(policy_factory=Worse) as server:
+    with ServerThread(policy_factory=Idle) as server:
         done = reproduced(bundle, server.url, tmp_path / "fresh", *told)
     assert done.code == 1
     assert "NOT REPRODUCED: 0 of 16 fresh trials succeeded" in done.out
