@@ -14,6 +14,7 @@ thought is left out of it, and a time in which the robot held leaves out nothing
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -242,25 +243,16 @@ class MotionLog:
     arrived: list[int] = field(default_factory=list)
     latencies: list[float] = field(default_factory=list)
 
-    def held(self) -> list[tuple[int, int]]:
+    def held(self) -> list[list[int]]:
         """Spans of periods in which the robot held: the first, and the first after it."""
-        found: list[tuple[int, int]] = []
-        for row, source in enumerate(self.sources):
-            if source == HELD:
-                start = found.pop()[0] if found and found[-1][1] == row else row
-                found.append((start, row + 1))
-        return found
+        holds = [False, *(source == HELD for source in self.sources), False]
+        spans: list[list[int]] = np.flatnonzero(np.diff(holds)).reshape(-1, 2).tolist()
+        return spans
 
     def seams(self) -> list[int]:
         """Periods in which an action came from another query than the action before it."""
-        found, last = [], None
-        for row, source in enumerate(self.sources):
-            if source == HELD:
-                continue
-            if last is not None and source != last:
-                found.append(row)
-            last = source
-        return found
+        acted = [(row, source) for row, source in enumerate(self.sources) if source != HELD]
+        return [row for (_, last), (row, source) in pairwise(acted) if source != last]
 
     def jerks(self) -> NDArray[np.float64]:
         """Jerk of the commanded motion at every period from the fourth on, that of the joint with
@@ -280,7 +272,7 @@ class MotionLog:
         found: dict[str, object] = {
             "periods": len(self.sources),
             "held": self.sources.count(HELD),
-            "held_spans": [list(span) for span in self.held()],
+            "held_spans": self.held(),
             "blind": sum(b and s != HELD for b, s in zip(self.blind, self.sources, strict=True)),
             "seams": len(seams),
         }

@@ -298,21 +298,16 @@ def test_film_files_go_on_in_a_next_file(tmp_path: Path) -> None:
 # -------------- the file of an episode comes back exactly, and a bad one is refused in one sentence
 
 
-def assert_equal(one: DatasetEpisode, other: DatasetEpisode) -> None:
-    for name in one.__dataclass_fields__:
-        a, b = getattr(one, name), getattr(other, name)
-        if name in ARRAYS:
-            assert a.dtype == b.dtype and a.tobytes() == b.tobytes(), name
-        else:
-            assert a == b, name
-
-
 @pytest.mark.parametrize("stills", [False, True])
 def test_reading_gives_back_every_bit(tmp_path: Path, stills: bool) -> None:
     episode = fake_episode(kind="midstate", stills=stills)
     path = tmp_path / "1000007.zip"
     path.write_bytes(episode_bytes(episode))
-    assert_equal(read_episode_file(path), episode)
+    found = read_episode_file(path)
+    for name, dtype in ARRAYS.items():
+        a, b = getattr(found, name), getattr(episode, name)
+        assert a.dtype == dtype and a.tobytes() == b.tobytes(), name
+    assert episode_bytes(found) == path.read_bytes()
 
 
 def test_equal_episodes_have_equal_bytes_and_execute_the_next_command() -> None:
@@ -348,7 +343,7 @@ def test_a_torn_or_changed_file_is_refused(tmp_path: Path, stills: bool) -> None
         except EpisodeFileError as error:
             assert "\n" not in str(error)
         else:  # a byte that says nothing, such as a name that is written twice
-            assert_equal(found, fake_episode(stills=stills))
+            assert episode_bytes(found) == whole
 
 
 def with_header(path: Path, **changes: object) -> Path:
@@ -365,7 +360,7 @@ def with_header(path: Path, **changes: object) -> Path:
 
 def test_another_layout_or_a_wrong_header_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "x.zip"
-    assert_equal(read_episode_file(with_header(path)), fake_episode())
+    assert episode_bytes(read_episode_file(with_header(path))) == episode_bytes(fake_episode())
     for changes, match in (
         ({"format": 1}, "layout 1"),
         ({"stride": -1}, "'stride'"),

@@ -82,21 +82,15 @@ def test_a_world_at_rest_is_drawn_once() -> None:
 REAL = TrialKey("Pick_Blocks_Size", 1, 100000)
 
 
-class Both(ActionRecorder):
+class Both(FilmRecorder):
     """Films the trial itself while its actions are kept."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.film = FilmRecorder()
+        self.kept = ActionRecorder()
 
-    def started(self, world: Any) -> None:
-        self.film.started(world)
-
-    def polled(self, world: Any, time: float) -> None:
-        self.film.polled(world, time)
-
-    def ended(self, world: Any) -> None:
-        self.film.ended(world)
+    def executed(self, *what: Any) -> None:
+        self.kept.executed(*what)
 
 
 @pytest.mark.sim
@@ -107,7 +101,7 @@ def test_the_pictures_are_those_of_the_trial(
     monkeypatch.setattr(FilmRecorder, "add", lambda self, image: seen.append(image.copy()))
     world, both = SapienWorld(render=True), Both()
     record = run_trial(world, Random(), REAL, policy_seed=3, recorder=both, step_scale=0.02)
-    write_actions(tmp_path, REAL, both.actions, "joint")
+    write_actions(tmp_path, REAL, both.kept.actions, "joint")
     during, seen[:] = list(seen), []
     film(world, record, tmp_path, step_scale=0.02)
     world.close()
