@@ -21,16 +21,21 @@ if TYPE_CHECKING:
     from robospa.harness.datasets.collect import collect as collect
     from robospa.harness.running.api import evaluate as evaluate
     from robospa.harness.settings import EvaluationSettings as EvaluationSettings
-    from robospa.observation import CameraSpec, Observation
-    from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
+    from robospa.observation import CameraSpec as CameraSpec
+    from robospa.observation import Observation as Observation
+    from robospa.protocol.policy import Policy as Policy
+    from robospa.protocol.policy import PolicySpec as PolicySpec
+    from robospa.protocol.policy import TrialInfo as TrialInfo
     from robospa.protocol.server import serve as serve
     from robospa.results.comparison.compare import compare as compare
     from robospa.results.records.trial_record import TrialRecord as TrialRecord
-    from robospa.results.run import LoadedRun as Run
+    from robospa.results.run import LoadedRun
     from robospa.results.run import load_run as load_run
     from robospa.tasks.catalog import build_scene as build_scene
     from robospa.tasks.scene import Scene as Scene
     from robospa.trial import TrialKey as TrialKey
+
+    Run = LoadedRun
 
 _HOMES = {
     "CameraSpec": "robospa.observation:CameraSpec",
@@ -54,27 +59,7 @@ _HOMES = {
 }
 """Where each public name is defined."""
 
-__all__ = [
-    "CameraSpec",
-    "EvaluationSettings",
-    "Observation",
-    "Policy",
-    "PolicySpec",
-    "Pose",
-    "Run",
-    "Scene",
-    "TrialInfo",
-    "TrialKey",
-    "TrialRecord",
-    "__version__",
-    "build_scene",
-    "collect",
-    "compare",
-    "connect",
-    "evaluate",
-    "load_run",
-    "serve",
-]
+__all__ = [*_HOMES, "__version__"]
 
 
 def __getattr__(name: str) -> Any:

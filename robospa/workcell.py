@@ -125,11 +125,10 @@ class FixedCamera:
 
     def pixel(self, x: Array, y: Array, z: Array | float) -> tuple[Array, Array]:
         """Column and row [px] of points [m] in an image of WIDTH x HEIGHT."""
-        forward, right, up = self.axes
+        forward, right, _ = self.axes
         depth = self._along(forward, x, y, z)
         column: Array = WIDTH / 2 + self.focal * self._along(right, x, y, z) / depth
-        row: Array = HEIGHT / 2 - self.focal * self._along(up, x, y, z) / depth
-        return column, row
+        return column, self.row(x, y, z)
 
     def row(self, x: Array, y: Array, z: Array | float) -> Array:
         """Row [px] of points [m] alone."""

@@ -12,7 +12,6 @@ every mode; with clutter, some of them end in a clause that names the kinds of t
 (`robospa.tasks.sentences`).
 """
 
-import hashlib
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -111,9 +110,7 @@ def _split_index(split: str) -> int:
 def _generator(scene: Scene, split: str, purpose: str, salt: str) -> np.random.Generator:
     _split_index(split)
     place = [scene.task, str(scene.level), str(scene.seed), split, purpose]
-    text = "/".join([scene.suite, *([salt] if salt else []), *place])
-    entropy = int.from_bytes(hashlib.sha256(text.encode()).digest()[:16], "big")
-    return np.random.Generator(np.random.PCG64(entropy))
+    return catalog.generator("/".join([scene.suite, *([salt] if salt else []), *place]))
 
 
 ANY_KIND = re.compile(r"\b(objects?|items?|things?|pieces?)\b", re.IGNORECASE)

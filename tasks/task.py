@@ -15,13 +15,6 @@ from robospa.trial import BASIC, CATEGORIES, SPATIAL
 from robospa.workcell import Workcell
 
 
-class HasFacts(Protocol):
-    """A scene, as far as facts are concerned."""
-
-    @property
-    def facts(self) -> Mapping[str, Any]: ...
-
-
 @dataclass(frozen=True)
 class SceneFacts:
     """What a task drew besides the objects: a frozen dataclass that `draw` writes and `of` reads.
@@ -39,7 +32,7 @@ class SceneFacts:
         }
 
     @classmethod
-    def of(cls, scene: HasFacts) -> Self:
+    def of(cls, scene: Scene) -> Self:
         """The facts of a scene; what the class has no field for is left out."""
         known = {f.name: scene.facts[f.name] for f in fields(cls) if f.name in scene.facts}
         return cls(**{name: _frozen(value) for name, value in known.items()})

@@ -198,11 +198,6 @@ def _announced(steps: Sequence[str]) -> str:
     return ", ".join(f"{w} {s}" for w, s in zip((*words, last), steps, strict=True)) + "."
 
 
-def _sentences(steps: Sequence[str]) -> str:
-    words = ("", "afterwards ", "next ", "then ", "finally ")
-    return " ".join(f"{word}{step}." for word, step in zip(words, steps, strict=False))
-
-
 def _paired(steps: Sequence[str]) -> str:
     pairs = [" and then ".join(steps[i : i + 2]) for i in range(0, len(steps), 2)]
     return "; after this, ".join(pairs) + "."
@@ -215,7 +210,7 @@ CHAINS: tuple[Chain, ...] = (
     lambda steps: " ".join(f"step {i}: {step}." for i, step in enumerate(steps, 1)),
     lambda steps: listed(steps) + ", in that order.",
     lambda steps: "do the following one after another: " + ", ".join(steps) + ".",
-    _sentences,
+    lambda steps: _each_told(steps, ("", "afterwards ", "next ", "then ", "finally ")),
     lambda steps: "finish each step before the next: " + listed(steps) + ".",
     _paired,
     lambda steps: "start: " + steps[0] + ". Continue: " + listed(steps[1:], ", then ") + ".",
@@ -223,23 +218,17 @@ CHAINS: tuple[Chain, ...] = (
 """Ten ways to give the steps as orders."""
 
 
-def _when_done(steps: Sequence[str]) -> str:
-    words = ("once done,", "next,", "after that,", "lastly,")
-    rest = [f" {word} {step}." for word, step in zip(words, steps[1:], strict=False)]
-    return "first of all, " + steps[0] + "." + "".join(rest)
+def _each_told(steps: Sequence[str], words: Sequence[str]) -> str:
+    return " ".join(f"{word}{step}." for word, step in zip(words, steps, strict=False))
 
 
-def _as_soon(steps: Sequence[str]) -> str:
-    words = ("after that,", "now", "following that,", "to finish,")
-    rest = [f" {word} {step}." for word, step in zip(words, steps[1:], strict=False)]
-    return "to start with, " + steps[0] + "." + "".join(rest)
-
-
+DONE = ("first of all, ", "once done, ", "next, ", "after that, ", "lastly, ")
+SOON = ("to start with, ", "after that, ", "now ", "following that, ", "to finish, ")
 HELDOUT_CHAINS: tuple[Chain, ...] = (
-    _when_done,
+    lambda steps: _each_told(steps, DONE),
     lambda steps: "carry out these steps in order: " + listed(steps) + ".",
     lambda steps: "here is what to do, step by step: " + "; ".join(steps) + ".",
-    _as_soon,
+    lambda steps: _each_told(steps, SOON),
     lambda steps: "go ahead and " + listed(steps) + ", one after the other.",
 )
 """Five other ways."""

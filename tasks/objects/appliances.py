@@ -87,11 +87,10 @@ def microwave(look: int, params: Params) -> ObjectModel:
         word, "{} microwave", "{} microwave oven", "microwave in {}", "small {} microwave",
         "{} kitchen microwave", "microwave with a {} housing",
     )  # fmt: skip
-    made = build.model(
-        "microwave", parts, "microwave", phrases, support=(0.0, 0.0, oven.top), hinge=hinge
-    )
+    top = (0.0, 0.0, oven.top)
+    made = build.model("microwave", parts, "microwave", phrases, support=top, hinge=hinge)
     handle = Pose((*oven.bar, oven.held), look_rotation((0.0, 1.0, 0.0), (1.0, 0.0, 0.0)))
-    return replace(made, frames={**made.frames, "handle": handle})
+    return build.with_frames(made, handle=handle)
 
 
 def _box(
@@ -119,10 +118,8 @@ def _housing(oven: Oven, color: Color, metallic: float) -> list[Shape]:
         for y in (oven.behind + 0.015, oven.back - 0.02)
     ]
     x = oven.panel + 0.28 * (oven.right - oven.panel)
-    slits = m.merge(
-        *(m.flat(m.rectangle(0.018, 0.0014, x, 0.012 + 0.009 * i), 0.0) for i in range(5))
-    )
-    vents = visual(slits, srgb("#3a3d44"), (0.0, 0.0, oven.top + 0.0004))
+    slits = [m.flat(m.rectangle(0.018, 0.0014, x, 0.012 + 0.009 * i), 0.0) for i in range(5)]
+    vents = visual(m.merge(*slits), srgb("#3a3d44"), (0.0, 0.0, oven.top + 0.0004))
     return [*shell, *feet, vents]
 
 
@@ -132,15 +129,13 @@ def _inside(oven: Oven) -> list[Shape]:
     low, high = oven.foot + WALL, oven.top - WALL
     rear = oven.back - WALL
     centre, deep = (oven.behind + rear) / 2, (rear - oven.behind) / 2 - 0.001
+    tall, z = (high - low) / 2, (low + high) / 2
+    side = m.rectangle(deep, tall)
     lining = m.merge(
         m.flat(m.rectangle(half, deep, middle, centre), low + 0.0003),
-        m.upright(m.rectangle(half, (high - low) / 2), (middle, rear - 0.0003, (low + high) / 2)),
-        m.upright(
-            m.rectangle(deep, (high - low) / 2), (left + 0.0003, centre, (low + high) / 2), 0.0
-        ),
-        m.upright(
-            m.rectangle(deep, (high - low) / 2), (right - 0.0003, centre, (low + high) / 2), math.pi
-        ),
+        m.upright(m.rectangle(half, tall), (middle, rear - 0.0003, z)),
+        m.upright(side, (left + 0.0003, centre, z), 0.0),
+        m.upright(side, (right - 0.0003, centre, z), math.pi),
     )
     plate = m.lathe([(0.052, 0.0), (0.056, 0.004), (0.053, 0.005), (0.0, 0.002)], 24)
     return [
@@ -198,9 +193,8 @@ def _door(oven: Oven, color: Color, metallic: float) -> list[Shape]:
 def _handle(oven: Oven, metallic: float) -> list[Shape]:
     (x, y), (wide, deep), (low, high) = oven.bar, oven.bar_half, oven.bar_ends
     half = (high - low) / 2
-    turned = m.lathe(
-        [(0.0, -half), (1.0, -half + 0.002), (1.0, half - 0.002), (0.0, half)], 14, False
-    )
+    profile = [(0.0, -half), (1.0, -half + 0.002), (1.0, half - 0.002), (0.0, half)]
+    turned = m.lathe(profile, 14, False)
     color = colour("silver") if metallic == 0.0 else build.DARK
     (bar,) = build.stretched([solid(turned, color, roughness=0.3)], wide, deep, 1.0)
     posts = [

@@ -11,7 +11,7 @@ from robospa.tasks.colors import NAMED, nearest
 from robospa.tasks.objects import build
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.build import collision, colour, solid, srgb, visual
-from robospa.tasks.shapes import Box, Color, Grasp, Mesh, ObjectModel, Params, Shape
+from robospa.tasks.shapes import Box, Color, Mesh, ObjectModel, Params, Shape
 
 SIDES = (-math.pi / 2, 0.0, math.pi / 2, math.pi)
 """Directions of an upright box's four faces: front (-y), right, back, left."""
@@ -108,9 +108,8 @@ def tissue_box(look: int, params: Params) -> ObjectModel:
     made = build.fitted(parts, TISSUE_SIZES[look])
     x, y, z = made.at(half[0], half[1], 0.024)
     top = made.at(0.0, 0.0, 2 * half[2])
-    return build.model(
-        "tissue_box", made.shapes, "tissue box", phrases, build.box_grasps(x, y, z), support=top
-    )
+    grasps = build.box_grasps(x, y, z)
+    return build.model("tissue_box", made.shapes, "tissue box", phrases, grasps, support=top)
 
 
 def _tissue(z: float) -> Mesh:
@@ -120,9 +119,8 @@ def _tissue(z: float) -> Mesh:
     mid += [(-0.015, -0.006), (-0.002, -0.01), (0.017, -0.004)]
     top = [(0.019, 0.002, 0.024), (0.001, 0.009, 0.02), (-0.013, 0.003, 0.027)]
     top += [(-0.019, -0.002, 0.022), (0.003, -0.004, 0.017), (0.009, -0.006, 0.025)]
-    rings = [[(x, y, z) for x, y in low], [(x, y, z + 0.011) for x, y in mid]]
-    rings.append([(x, y, z + h) for x, y, h in top])
-    return m.loft(rings)
+    edge = [(x, y, z + h) for x, y, h in top]
+    return m.loft([m.ring(low, z), m.ring(mid, z + 0.011), edge])
 
 
 CARDS = (("red", "#ffffff", "red"), ("blue", "#ffffff", "blue"), ("black", "#d6a52c", "black"),
@@ -232,24 +230,12 @@ def _block_phrases(color: Color) -> tuple[str, ...]:
 @lru_cache(maxsize=1024)
 def _plain_block(half: Vec3) -> ObjectModel:
     """A block of that size: what does not depend on its colour, which is new in many a scene."""
-    return build.model(
-        "block",
-        [solid(Box(half), (1.0, 1.0, 1.0), roughness=0.6)],
-        "block",
-        (),
-        _block_grasps(half),
-        mass=0.01,
-        support=(0.0, 0.0, half[2]),
-    )
-
-
-def _block_grasps(half: Vec3) -> tuple[Grasp, ...]:
-    """At half height; a tall block is taken higher, where the palm still clears its top."""
-    z = max(0.0, half[2] - 0.035)
-    found = list(build.box_grasps(half[0], half[1], z))
-    if len(found) == 2 and half[1] < half[0]:
-        found.reverse()
-    return tuple(found)
+    # at half height; a tall block is taken higher, where the palm still clears its top
+    grasps = build.box_grasps(half[0], half[1], max(0.0, half[2] - 0.035))
+    if half[1] < half[0]:
+        grasps = grasps[::-1]
+    shape, top = solid(Box(half), (1.0, 1.0, 1.0), roughness=0.6), (0.0, 0.0, half[2])
+    return build.model("block", [shape], "block", (), grasps, mass=0.01, support=top)
 
 
 CUBE_HALF = 0.028
@@ -298,17 +284,8 @@ def rubikscube(look: int, params: Params) -> ObjectModel:
         patches.setdefault(name, []).append(patch)
     parts: list[Shape] = [solid(Box((h, h, h)), srgb(body), (0.0, 0.0, h), roughness=0.4)]
     parts += [visual(m.merge(*p), STICKERS[n], roughness=0.35) for n, p in patches.items()]
-    return build.model(
-        "rubikscube",
-        parts,
-        "Rubik's cube",
-        phrases,
-        [
-            build.top_grasp((0.0, 0.0, h), 2 * h, 0.0),
-            build.top_grasp((0.0, 0.0, h), 2 * h, math.pi / 2),
-        ],
-        support=(0.0, 0.0, 2 * h),
-    )
+    grasps, top = build.box_grasps(h, h, h), (0.0, 0.0, 2 * h)
+    return build.model("rubikscube", parts, "Rubik's cube", phrases, grasps, support=top)
 
 
 ASSETS = build.library(

@@ -94,14 +94,8 @@ def can(look: int, params: Params) -> ObjectModel:
         base, "{} drink can", "{} soda can", "can in {}", "{} can", "{} beverage can",
         "{} aluminium can", "can of soda with a {} body",
     )  # fmt: skip
-    return build.model(
-        "can",
-        parts,
-        "can",
-        phrases,
-        build.round_grasps(2 * r, CAN_GRIP, 1.2),
-        support=(0.0, 0.0, h),
-    )
+    grasps = build.round_grasps(2 * r, CAN_GRIP, 1.2)
+    return build.model("can", parts, "can", phrases, grasps, support=(0.0, 0.0, h))
 
 
 def _sign(sign: str, r: float, h: float) -> Mesh:
@@ -109,13 +103,8 @@ def _sign(sign: str, r: float, h: float) -> Mesh:
         return around(m.star(0.021, 0.0095), r + 0.0012, h / 2)
     if sign == "bubbles":
         dots = [(0.0, 0.012, 0.011), (-0.012, -0.006, 0.007), (0.011, -0.012, 0.008)]
-        return m.merge(
-            *(
-                m.decal(m.ellipse(s, s, 8), r + 0.0008, h / 2 + v, a + u / r)
-                for a in THIRDS
-                for u, v, s in dots
-            )
-        )
+        return m.merge(*(m.decal(m.ellipse(s, s, 8), r + 0.0008, h / 2 + v, a + u / r)
+                         for a in THIRDS for u, v, s in dots))  # fmt: skip
     faces, vertices = [], []
     n = 16
     for i in range(n + 1):
@@ -234,8 +223,7 @@ def _ribbed(radius: float, low: float, high: float) -> Mesh:
         for s in ((1.0, 0.94)[i % 2],)
     ]
     disc = [(x * 0.93, y * 0.93) for x, y in rim]
-    rings = [(rim, low), (rim, high - 0.001), (disc, high)]
-    return m.loft([[(x, y, z) for x, y in ring] for ring, z in rings])
+    return m.loft([m.ring(rim, low), m.ring(rim, high - 0.001), m.ring(disc, high)])
 
 
 GLUES = (

@@ -5,7 +5,7 @@ For throwing away: `table_trash_bin`, a small bin to empty, and `garbage`, what 
 
 import math
 
-from robospa.geometry import Pose, axis_rotation, multiply
+from robospa.geometry import Pose, Vec3, axis_rotation, multiply
 from robospa.tasks.objects import build
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.build import collision, colour, solid, srgb, visual
@@ -31,9 +31,8 @@ def bowl(look: int, params: Params) -> ObjectModel:
     foot, belly = 0.414 * rim, 0.742 * rim
     stand, middle = 0.27 * h, 0.54 * h
     low, high = math.atan2(belly - foot, middle - stand), math.atan2(rim - belly, h - middle)
-    floor = (
-        stand + build.RIM / math.sin(low) + 0.0015
-    )  # so high that another bowl's foot fits inside
+    # so high that another bowl's foot fits inside
+    floor = stand + build.RIM / math.sin(low) + 0.0015
     thick = build.RIM / math.cos(high)
 
     def wall(z: float) -> float:
@@ -65,10 +64,9 @@ def bowl(look: int, params: Params) -> ObjectModel:
         word, "{} bowl", "{} soup bowl", "bowl in {}", "round {} bowl", "{} cereal bowl",
         "bowl that is {} on the outside", "{} ceramic bowl",
     )  # fmt: skip
-    grip = 0.86 * h
-    grasps = build.rim_grasps(
-        wall(grip) * flat - thick / 2, build.RIM, grip, BOWL_SIDES, lean=round(high, 4)
-    )
+    grip, lean = 0.86 * h, round(high, 4)
+    held = wall(grip) * flat - thick / 2
+    grasps = build.rim_grasps(held, build.RIM, grip, BOWL_SIDES, lean)
     made = build.model("bowl", parts, "bowl", phrases, grasps, mass=0.01, support=(0.0, 0.0, floor))
     return build.with_frames(made, nest=Pose((0.0, 0.0, floor)))
 
@@ -146,7 +144,7 @@ def bread_basket(look: int, params: Params) -> ObjectModel:
     dark, pale, word, cloth = BASKETS[look]
     length, width, high = BASKET_SIZES[look]
     edge, inside, outside, floor = 0.0042, 0.0735, 0.0785, 0.008
-    h = high - edge
+    h, hem = high - edge, high - edge - 0.012
     rows = round(h / 0.01)
     weave: dict[str, list[Mesh]] = {dark: [], pale: []}
     step = h / rows
@@ -163,10 +161,8 @@ def bread_basket(look: int, params: Params) -> ObjectModel:
     parts = [
         visual(m.merge(*weave[dark]), srgb(dark), roughness=0.9),
         visual(m.merge(*weave[pale]), srgb(pale), roughness=0.9),
-        visual(
-            m.lathe([(inside, h - 0.012), (inside, floor), (0.0, floor)], 20, False), colour(cloth)
-        ),
-        visual(m.lathe([(inside, h), (inside, h - 0.012)], 20, False), srgb(dark), roughness=0.9),
+        visual(m.lathe([(inside, hem), (inside, floor), (0.0, floor)], 20, False), colour(cloth)),
+        visual(m.lathe([(inside, h), (inside, hem)], 20, False), srgb(dark), roughness=0.9),
         collision(Cylinder(0.077, floor / 2), (0.0, 0.0, floor / 2)),
         *build.wall_ring(inside, 0.005, 0.0, h, 16),
     ]
@@ -201,16 +197,13 @@ def dustbin(look: int, params: Params) -> ObjectModel:
     wall, floor, foot, edge = 0.014, 0.21, 0.94, 0.075
     outer = m.rounded_rectangle(hx, hy, 0.03, 3)
     inner = m.rounded_rectangle(hx - wall, hy - wall, 0.02, 3)
-
-    def ring(outline: m.Polygon, z: float, scale: float = 1.0) -> list[tuple[float, float, float]]:
-        return [(x * scale, y * scale, z) for x, y in outline]
-
+    rim, lip, hem = m.ring(outer, h), m.ring(inner, h), m.ring(inner, h - edge)
     low = m.rounded_rectangle(hx - wall - 0.03, hy - wall - 0.04, 0.04, 3)
     parts = [
-        visual(m.loft([ring(outer, 0.0, foot), ring(outer, h)], False), srgb(shell), roughness=0.6),
-        visual(m.loft([ring(outer, h), ring(inner, h)], False), srgb(shell), roughness=0.6),
-        visual(m.loft([ring(inner, h), ring(inner, h - edge)], False), srgb(dark), roughness=0.6),
-        visual(m.loft([ring(inner, h - edge), ring(low, floor)], False), LINER, roughness=0.9),
+        visual(m.loft([m.ring(outer, 0.0, foot), rim], False), srgb(shell), roughness=0.6),
+        visual(m.loft([rim, lip], False), srgb(shell), roughness=0.6),
+        visual(m.loft([lip, hem], False), srgb(dark), roughness=0.6),
+        visual(m.loft([hem, m.ring(low, floor)], False), LINER, roughness=0.9),
         visual(m.flat(low, floor), srgb("#c3c9cf"), roughness=0.9),
         visual(m.merge(*_pleats(hx - wall, hy - wall, h - edge, floor)), srgb("#b9c1c8")),
         visual(_recycling(hx, h), colour("white")),
@@ -242,16 +235,9 @@ def _pleats(hx: float, hy: float, high: float, low: float) -> list[Mesh]:
             x, y = math.cos(facing), math.sin(facing)
             part = m.upright(outline, (0.0, 0.0, 0.0), facing)
             slope = (0.03 if abs(x) > 0.5 else 0.04) / (high - low)
-            strips.append(
-                m.mesh(
-                    [
-                        (a - x * (out - slope * (high - z) - 0.002),
-                         b - y * (out - slope * (high - z) - 0.002), z)
-                        for a, b, z in part.vertices
-                    ],
-                    part.faces,
-                )
-            )  # fmt: skip
+            shifts = ((v, out - slope * (high - v[2]) - 0.002) for v in part.vertices)
+            leaning = [(a - x * s, b - y * s, z) for (a, b, z), s in shifts]
+            strips.append(m.mesh(leaning, part.faces))
     return strips
 
 
@@ -331,30 +317,29 @@ def table_trash_bin(look: int, params: Params) -> ObjectModel:
     wall = WALL * 2 * high / TRASH_BIN_SIZES[look][0]  # before it is stretched
     lean = math.atan2(high - low, h)
 
-    def square(half: float, z: float, corner: float = 0.007) -> list[tuple[float, float, float]]:
-        return [(x, y, z) for x, y in m.rounded_rectangle(half, half, corner, 4)]
+    def square(half: float, z: float, corner: float = 0.007) -> list[Vec3]:
+        return m.ring(m.rounded_rectangle(half, half, corner, 4), z)
 
     def half_at(z: float) -> float:
         return low + z * math.tan(lean)
 
     shell = m.loft([square(low, 0.0), square(high, h)], False)
     lip = m.loft([square(high, h), square(high - wall, h, 0.005)], False)
-    inner = m.loft(
-        [square(high - wall, h, 0.005), square(half_at(floor) - wall, floor, 0.005)], False
-    )
-    base = m.rounded_rectangle(half_at(floor) - wall, half_at(floor) - wall, 0.005, 4)
+    well = half_at(floor) - wall
+    inner = m.loft([square(high - wall, h, 0.005), square(well, floor, 0.005)], False)
+    base = m.rounded_rectangle(well, well, 0.005, 4)
     stripe = m.loft([square(half_at(z) + 0.0004, z) for z in (h - 0.013, h - 0.005)], False)
     under = [(x, y, 0.0) for x, y, _ in reversed(square(low, 0.0))]
     underside = m.mesh(under, m.triangulate([(x, -y) for x, y, _ in under]))
-    shade = tuple(0.55 * c for c in colour(body))
+    red, green, blue = colour(body)
+    shade = (0.55 * red, 0.55 * green, 0.55 * blue)
+    icons = _can_icons(half_at(0.036) + 0.0006, lean)
     parts = [
         visual(shell, colour(body), roughness=0.5),
         visual(lip, colour(body), roughness=0.5),
-        visual(inner, (shade[0], shade[1], shade[2]), roughness=0.7),
-        visual(m.flat(base, floor), (shade[0], shade[1], shade[2]), roughness=0.7),
-        visual(
-            m.merge(stripe, *_can_icons(half_at(0.036) + 0.0006, lean)), colour(band), roughness=0.5
-        ),
+        visual(inner, shade, roughness=0.7),
+        visual(m.flat(base, floor), shade, roughness=0.7),
+        visual(m.merge(stripe, *icons), colour(band), roughness=0.5),
         visual(underside, colour(body), roughness=0.5),
         collision(Box((low, low, floor / 2)), (0.0, 0.0, floor / 2)),
     ]
@@ -363,9 +348,8 @@ def table_trash_bin(look: int, params: Params) -> ObjectModel:
         a = math.pi / 2 * k
         turned = multiply(axis_rotation((0.0, 0.0, 1.0), a), axis_rotation((0.0, 1.0, 0.0), lean))
         at = (middle * math.cos(a), middle * math.sin(a), h / 2)
-        parts.append(
-            collision(Box((wall / 2, high - 0.0015, h / 2 / math.cos(lean) - 0.0005)), at, turned)
-        )
+        side = Box((wall / 2, high - 0.0015, h / 2 / math.cos(lean) - 0.0005))
+        parts.append(collision(side, at, turned))
     phrases = build.fill_phrases(
         body, "{} trash bin", "{} table bin", "small {} trash bin", "{} desktop trash bin",
         "little {} bin", "{} tabletop bin", "{} desk bin",
@@ -385,14 +369,11 @@ def table_trash_bin(look: int, params: Params) -> ObjectModel:
 def _can_icons(out: float, lean: float) -> list[Mesh]:
     """A small drawing of a bin on each of the four walls, `out` [m] from the axis."""
     can = [(-0.0058, -0.0095), (0.0058, -0.0095), (0.0075, 0.0050), (-0.0075, 0.0050)]
+    lid, knob = m.rectangle(0.0090, 0.0011, 0.0, 0.0075), m.rectangle(0.0028, 0.001, 0.0, 0.0098)
     pieces = []
     for k in range(4):
         a = math.pi / 2 * k
-        for outline in (
-            can,
-            m.rectangle(0.0090, 0.0011, 0.0, 0.0075),
-            m.rectangle(0.0028, 0.001, 0.0, 0.0098),
-        ):
+        for outline in (can, lid, knob):
             part = m.upright(outline, (0.0, 0.0, 0.0), 0.0)
             tipped = m.moved(part, (out, 0.0, 0.036), axis_rotation((0.0, 1.0, 0.0), lean))
             pieces.append(m.moved(tipped, rotation=axis_rotation((0.0, 0.0, 1.0), a)))
@@ -412,9 +393,8 @@ def garbage(look: int, params: Params) -> ObjectModel:
         word, "{} ball", "{} piece of garbage", "small {} ball", "ball of {} garbage",
         "{} piece of trash", "little {} ball",
     )  # fmt: skip
-    return build.model(
-        "garbage", parts, "ball", phrases, build.round_grasps(2 * r, r, 0.7), mass=0.002
-    )
+    grasps = build.round_grasps(2 * r, r, 0.7)
+    return build.model("garbage", parts, "ball", phrases, grasps, mass=0.002)
 
 
 ASSETS = build.library(

@@ -31,13 +31,10 @@ def stapler(look: int, params: Params) -> ObjectModel:
     arm += [(0.0405, 0.0250), (0.033, 0.0335), (0.004, 0.0385), (-0.035, 0.0385), (-0.0405, 0.0345)]
     rail = [(-0.0385, 0.0155), (0.030, 0.0095), (0.030, 0.0145), (-0.0345, 0.0200)]
     rail += [(-0.0385, 0.0200)]
-    ridges = [
-        m.moved(
-            m.prism(m.rectangle(0.0072, 0.0011), 0.0, 0.0009), (0.0, -0.036 + 0.0042 * i, 0.0384)
-        )
-        for i in range(4)
-    ]
+    ridge = m.prism(m.rectangle(0.0072, 0.0011), 0.0, 0.0009)
+    ridges = [m.moved(ridge, (0.0, -0.036 + 0.0042 * i, 0.0384)) for i in range(4)]
     stripe = m.flat(m.rectangle(0.0016, 0.0135, 0.0, -0.006), 0.0390)
+    axle = Cylinder(0.0048, 0.0128)
     parts = [
         collision(Box((w, 0.0412, 0.0035)), (0.0, 0.0, 0.0035)),
         collision(m.side_prism(arm, w)),
@@ -47,9 +44,7 @@ def stapler(look: int, params: Params) -> ObjectModel:
         visual(_rounded_arm(arm, w), colour(top), roughness=0.3),
         visual(m.merge(*ridges, stripe), colour(base) if base != "black" else srgb("#3a3c42")),
         visual(m.prism(m.rectangle(0.0062, 0.0045, 0.0, -0.034), 0.0074, 0.0084), build.STEEL),
-        visual(
-            Cylinder(0.0048, 0.0128), build.STEEL, (0.0, 0.0345, 0.0165), build.ALONG_X, 0.3, 0.4
-        ),
+        visual(axle, build.STEEL, (0.0, 0.0345, 0.0165), build.ALONG_X, 0.3, 0.4),
     ]
     phrases = build.fill_phrases(
         top, "{} stapler", "stapler with a {} top", "{} desk stapler", "stapler in {}",
@@ -276,9 +271,8 @@ def fan(look: int, params: Params) -> ObjectModel:
         "{} table fan", f"{frame} fan with {blade} blades",
     )  # fmt: skip
     made = build.fitted(parts, FAN_SIZES[look])
-    grasps = (
-        build.top_grasp(made.at(0.0, 0.0, z + 0.032), 2 * deep * made.factors[1], math.pi / 2, 0.8),
-    )
+    thick = 2 * deep * made.factors[1]
+    grasps = (build.top_grasp(made.at(0.0, 0.0, z + 0.032), thick, math.pi / 2, 0.8),)
     return build.model("fan", made.shapes, "fan", phrases, grasps, mass=0.01)
 
 

@@ -40,9 +40,7 @@ def hamburger(look: int, params: Params) -> ObjectModel:
     turned = [((x - y) * math.sqrt(0.5), (x + y) * math.sqrt(0.5)) for x, y in square]
     parts = [
         collision(Cylinder(r, 0.0155), (0.0, 0.0, 0.0155)),
-        collision(
-            m.lathe([(r, 0.031), (r - 0.004, 0.040), (r - 0.013, 0.047), (0.004, 0.050)], 14)
-        ),
+        collision(m.lathe([*top[1:4], (0.004, 0.050)], 14)),
         visual(m.lathe(low, 16), srgb(bun), roughness=0.8),
         visual(_lettuce(r, 0.0125), srgb("#57b030"), roughness=0.8),
         visual(m.lathe(patty, 14), srgb("#4b2413"), roughness=0.9),
@@ -63,14 +61,11 @@ def _lettuce(r: float, z: float) -> Mesh:
     sag = [(-0.0022 if i % 2 else 0.0012) for i in range(20)]
     low = [(x, y, z + s - 0.0006) for (x, y), s in zip(ring, sag, strict=True)]
     high = [(x, y, z + s + 0.0012) for (x, y), s in zip(ring, sag, strict=True)]
-    inner = [(x * 0.8, y * 0.8, z + 0.002) for x, y in ring]
-    return m.loft([[(x * 0.8, y * 0.8, z) for x, y in ring], low, high, inner], False)
+    return m.loft([m.ring(ring, z, 0.8), low, high, m.ring(ring, z + 0.002, 0.8)], False)
 
 
 def _seeds(r: float) -> Mesh:
-    tip = [(0.0, 0.0, 0.0011)]
-    foot = [(x, y, 0.0) for x, y in m.ellipse(0.0024, 0.0013, 5)]
-    seed = m.loft([foot, tip * 5], False)
+    seed = m.loft([m.ring(m.ellipse(0.0024, 0.0013, 5), 0.0), [(0.0, 0.0, 0.0011)] * 5], False)
     parts = []
     for ring, z, count in ((0.009, 0.0487, 5), (0.0165, 0.0474, 8), (0.0222, 0.0437, 9)):
         for i in range(count):
@@ -93,11 +88,11 @@ def french_fries(look: int, params: Params) -> ObjectModel:
     """A flared carton full of fries."""
     base, mark, size = FRIES[look]
     foot, mouth, h = (0.022, 0.0155), (0.0315, 0.0215), 0.056
-    low = [(x, y, 0.0) for x, y in m.rounded_rectangle(*foot, 0.004, 2)]
+    low = m.ring(m.rounded_rectangle(*foot, 0.004, 2), 0.0)
     lip = m.rounded_rectangle(*mouth, 0.005, 2)
     dip = [(x, y, h - (0.010 * (1 - (x / mouth[0]) ** 2) if y < 0 else -0.008)) for x, y in lip]
     inner = [(x * 0.94, y * 0.94, z) for x, y, z in dip]
-    bottom = [(x * 0.8, y * 0.8, h - 0.016) for x, y in lip]
+    bottom = m.ring(lip, h - 0.016, 0.8)
     carton = m.loft([low, dip, inner, bottom], False)
     underside = m.loft([low, [(x * 0.9, y * 0.9, 0.0005) for x, y, _ in low]], True)
     emblem = []
@@ -105,12 +100,9 @@ def french_fries(look: int, params: Params) -> ObjectModel:
         hump = m.ellipse(0.0125, 0.0125, 12)
         part = m.upright(hump, (0.0, 0.0, 0.026), s * math.pi / 2)
         lean = (mouth[1] - foot[1]) / h
-        emblem.append(
-            m.mesh(
-                [(x, s * (foot[1] + lean * z + 0.0006), z) for x, _, z in part.vertices], part.faces
-            )
-        )
-    hull = m.loft([low, [(x, y, h - 0.003) for x, y in lip]])
+        tipped = [(x, s * (foot[1] + lean * z + 0.0006), z) for x, _, z in part.vertices]
+        emblem.append(m.mesh(tipped, part.faces))
+    hull = m.loft([low, m.ring(lip, h - 0.003)])
     parts: list[Shape] = [
         collision(hull),
         collision(Box((0.024, 0.014, 0.014)), (0.0, 0.0, h + 0.010)),

@@ -2,7 +2,7 @@
 
 import math
 
-from robospa.geometry import Pose, axis_rotation
+from robospa.geometry import Pose, Vec3, axis_rotation
 from robospa.tasks.objects import build
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.build import collision, colour, srgb, visual
@@ -35,6 +35,8 @@ def phone(look: int, params: Params) -> ObjectModel:
         for column in range(4):
             at = (-0.0141 + 0.0094 * column, 0.026 - 0.0115 * row)
             icons[(row * 3 + column + look) % 4].append(m.flat(square, h + 0.0011, at))
+    screen = m.rounded_rectangle(hx - 0.0018, hy - 0.0018, 0.0045)
+    lit = m.rounded_rectangle(hx - 0.0035, hy - 0.0040, 0.003)
     dock = m.flat(m.rounded_rectangle(0.0175, 0.0055, 0.002, 2), h + 0.0009, (0.0, -0.031))
     side = [
         m.upright(m.rectangle(s, 0.0013), (hx + 0.0004, y, h / 2), 0.0)
@@ -43,15 +45,8 @@ def phone(look: int, params: Params) -> ObjectModel:
     parts = [
         collision(Box((hx, hy, h / 2)), (0.0, 0.0, h / 2)),
         visual(m.slab(hx, hy, h, 0.006, 0.0015), colour(body), roughness=0.3),
-        visual(
-            m.flat(m.rounded_rectangle(hx - 0.0018, hy - 0.0018, 0.0045), h + 0.0003),
-            srgb("#0c0d10"),
-        ),
-        visual(
-            m.flat(m.rounded_rectangle(hx - 0.0035, hy - 0.0040, 0.003), h + 0.0006),
-            srgb(wall),
-            roughness=0.2,
-        ),
+        visual(m.flat(screen, h + 0.0003), srgb("#0c0d10")),
+        visual(m.flat(lit, h + 0.0006), srgb(wall), roughness=0.2),
         visual(dock, srgb("#dfe5ee")),
         *(visual(m.merge(*p), srgb(c)) for p, c in zip(icons, ICONS, strict=True)),
         visual(m.merge(*side), build.DARK),
@@ -93,6 +88,7 @@ def remote_control(look: int, params: Params) -> ObjectModel:
     ring_out, ring_in = m.ellipse(0.0105, 0.0105, 16), m.ellipse(0.0042, 0.0042, 10)
     pad = m.moved(m.prism(ring_out, 0.0, 0.0010, under=False), (0.0, 0.0085, h - 0.0002))
     bars = [_key(m.rectangle(0.0016, 0.0042), h, (s * 0.009, 0.0255)) for s in (-1, 1)]
+    eye = m.upright(m.rectangle(0.0075, 0.0035), (0.0, hy + 0.0003, h / 2), math.pi / 2)
     shade = srgb("#3a3d44") if body == "black" else build.DARK
     parts = [
         collision(Box((hx, hy, h / 2)), (0.0, 0.0, h / 2)),
@@ -101,10 +97,7 @@ def remote_control(look: int, params: Params) -> ObjectModel:
         visual(pad, srgb(keys) if look % 2 else shade, roughness=0.5),
         visual(m.flat(ring_in, h + 0.0012, (0.0, 0.0085)), shade if look % 2 else srgb(keys)),
         visual(_key(m.ellipse(0.0036, 0.0036, 10), h, (0.0, 0.0310)), srgb(power)),
-        visual(
-            m.upright(m.rectangle(0.0075, 0.0035), (0.0, hy + 0.0003, h / 2), math.pi / 2),
-            srgb("#400c14"),
-        ),
+        visual(eye, srgb("#400c14")),
     ]
     phrases = build.fill_phrases(
         body, "{} remote control", "{} remote", "{} TV remote", "remote control in {}",
@@ -117,7 +110,7 @@ def remote_control(look: int, params: Params) -> ObjectModel:
 
 
 def _key(outline: m.Polygon, h: float, at: m.Point) -> Mesh:
-    return m.moved(m.prism(outline, -0.0002, 0.0011, 0.9, under=False), (at[0], at[1], h))
+    return m.moved(m.prism(outline, -0.0002, 0.0011, 0.9, under=False), (*at, h))
 
 
 CLOCKS = (
@@ -220,6 +213,7 @@ def _two_bells(body: str, metal: str) -> tuple[list[Shape], float]:
         domes.append(m.moved(cap, (s * 0.0190, 0.0, z + r - 0.0055), tip))
     legs = m.merge(*(m.tube([(s * 0.016, 0.0, z - r + 0.010), (s * 0.0225, 0.0, 0.0008)], 0.0036, 5)
                      for s in (-1, 1)))  # fmt: skip
+    standing = [(x, y, max(0.0, up)) for x, y, up in legs.vertices]
     arch = ((-0.007, -0.001), (-0.0045, 0.011), (0.0045, 0.011), (0.007, -0.001))
     handle = m.tube([(x, 0.0, z + r + up) for x, up in arch], 0.0016, 5)
     trim = colour(metal)
@@ -236,11 +230,7 @@ def _two_bells(body: str, metal: str) -> tuple[list[Shape], float]:
         visual(marks, build.DARK, at, build.ALONG_Y),
         visual(m.moved(marks, rotation=over), build.DARK, at, build.ALONG_Y),
         visual(m.merge(*domes, handle), trim, roughness=0.3, metallic=shine),
-        visual(
-            m.mesh([(x, y, max(0.0, up)) for x, y, up in legs.vertices], legs.faces),
-            trim,
-            roughness=0.4,
-        ),
+        visual(m.mesh(standing, legs.faces), trim, roughness=0.4),
         build.outline(m.merge(corners, *before), at, build.ALONG_Y),
     ]
     return parts, z + r + 0.007
@@ -270,30 +260,21 @@ def toycar(look: int, params: Params) -> ObjectModel:
     w = 0.0165
     low = [(-0.0365, 0.0075), (0.0365, 0.0075), (0.0365, 0.0185), (0.031, 0.0215), (-0.012, 0.0220)]
     low += [(-0.032, 0.0190), (-0.0365, 0.0150)]
-    glass = _cabin(0.0216, 0.0328)
-    roof = m.loft([
-        [(x, y + 0.0075, 0.0326) for x, y in m.rounded_rectangle(0.0124, 0.0128, 0.004, 2)],
-        [(x, y + 0.0075, 0.0350) for x, y in m.rounded_rectangle(0.0108, 0.0112, 0.004, 2)],
-    ])  # fmt: skip
+    glass, felt = (
+        _taper((0.0148, 0.0195, low_z), (0.0122, 0.0126, high_z))
+        for low_z, high_z in ((0.0216, 0.0328), (0.0210, 0.0350))
+    )
+    roof = _taper((0.0124, 0.0128, 0.0326), (0.0108, 0.0112, 0.0350))
+    bonnet = m.rectangle(0.004, 0.0095, y=-0.022)
     bands = [
         m.flat(m.rectangle(0.0040, 0.0098, 0.0, 0.0075), 0.0354),
         m.mesh(
-            [
-                (x, y, 0.0194 if y < -0.02 else 0.0224)
-                for x, y in m.rectangle(0.004, 0.0095, y=-0.022)
-            ],
-            [(0, 1, 2), (0, 2, 3)],
+            [(x, y, 0.0194 if y < -0.02 else 0.0224) for x, y in bonnet], [(0, 1, 2), (0, 2, 3)]
         ),
         m.flat(m.rectangle(0.0040, 0.0038, 0.0, 0.0270), 0.0219),
     ]
-    posts = [
-        m.box_mesh(
-            (0.0013, 0.0022, 0.0056),
-            (s * 0.0138, 0.0085, 0.0272),
-            axis_rotation((0.0, 1.0, 0.0), -s * 0.19),
-        )
-        for s in (-1, 1)
-    ]
+    leans = [(s * 0.0138, axis_rotation((0.0, 1.0, 0.0), -s * 0.19)) for s in (-1, 1)]
+    posts = [m.box_mesh((0.0013, 0.0022, 0.0056), (x, 0.0085, 0.0272), turn) for x, turn in leans]
     lamps = [
         m.upright(m.ellipse(0.0030, 0.0022, 8), (s * 0.0115, -0.0369, 0.0120)) for s in (-1, 1)
     ]
@@ -303,13 +284,15 @@ def toycar(look: int, params: Params) -> ObjectModel:
     ]
     bumper = [m.box_mesh((0.0160, 0.0011, 0.0018), (0.0, s * 0.0366, 0.0085)) for s in (-1, 1)]
     wheels = [(s * 0.0150, y) for s in (-1, 1) for y in (-0.0225, 0.0225)]
-    tyre, hub = (
-        m.lathe([(0.0084, -0.0035), (0.0088, -0.002), (0.0088, 0.002), (0.0084, 0.0035)], 12),
-        m.lathe([(0.0046, -0.0039), (0.0046, 0.0039)], 8),
+    tyre = m.lathe([(0.0084, -0.0035), (0.0088, -0.002), (0.0088, 0.002), (0.0084, 0.0035)], 12)
+    hub = m.lathe([(0.0046, -0.0039), (0.0046, 0.0039)], 8)
+    tyres, hubs = (
+        m.merge(*(m.moved(part, (x, y, 0.0088), build.ALONG_X) for x, y in wheels))
+        for part in (tyre, hub)
     )
     parts: list[Shape] = [
         collision(Box((0.0183, 0.0360, 0.0105)), (0.0, 0.0, 0.0105)),
-        collision(_cabin(0.0210, 0.0350)),
+        collision(felt),
         visual(m.side_prism(low, w), colour(body), roughness=0.25),
         visual(glass, srgb("#1d2a3a"), roughness=0.15),
         visual(m.merge(roof, *posts), colour(body), roughness=0.25),
@@ -317,14 +300,8 @@ def toycar(look: int, params: Params) -> ObjectModel:
         visual(m.merge(*lamps), srgb("#fff3b0")),
         visual(m.merge(*tails), srgb("#a3101a") if body != "red" else srgb("#ffb0a0")),
         visual(m.merge(*bumper), build.STEEL, roughness=0.3, metallic=0.3),
-        *(
-            visual(
-                m.merge(*(m.moved(part, (x, y, 0.0088), build.ALONG_X) for x, y in wheels)),
-                srgb(color),
-                roughness=roughness,
-            )
-            for part, color, roughness in ((tyre, "#18181a", 0.9), (hub, "#cfd3d8", 0.3))
-        ),
+        visual(tyres, srgb("#18181a"), roughness=0.9),
+        visual(hubs, srgb("#cfd3d8"), roughness=0.3),
     ]
     phrases = build.fill_phrases(
         body, "{} toy car", "{} car", "small {} car", "toy car in {}", "{} model car",
@@ -336,12 +313,10 @@ def toycar(look: int, params: Params) -> ObjectModel:
     return build.model("toycar", made.shapes, "toy car", phrases, grasps)
 
 
-def _cabin(low: float, high: float) -> Mesh:
-    wide = m.rounded_rectangle(0.0148, 0.0195, 0.004, 2)
-    narrow = m.rounded_rectangle(0.0122, 0.0126, 0.004, 2)
-    return m.loft(
-        [[(x, y + 0.0075, low) for x, y in wide], [(x, y + 0.0075, high) for x, y in narrow]]
-    )
+def _taper(*levels: Vec3) -> Mesh:
+    """Rounded rectangles, each of half sizes (x, y) at a height z, behind the car's middle."""
+    outlines = [(m.rounded_rectangle(hx, hy, 0.004, 2), z) for hx, hy, z in levels]
+    return m.loft([[(x, y + 0.0075, z) for x, y in outline] for outline, z in outlines])
 
 
 ASSETS = build.library(

@@ -32,10 +32,9 @@ def cup(look: int, params: Params) -> ObjectModel:
     inner = [(top - wall, h), (radius(floor) - wall, floor), (0.0, floor)]
     glaze = colour("cream") if base == "white" else colour("white")
     if style == "dots":
+        dot = m.ellipse(0.0075, 0.0075, 8)
         marks = [
-            m.decal(
-                m.ellipse(0.0075, 0.0075, 8), radius(z) + 0.0008, z, math.pi / 4 * (i + 0.5 * row)
-            )
+            m.decal(dot, radius(z) + 0.0008, z, math.pi / 4 * (i + 0.5 * row))
             for row, z in enumerate((0.26 * h, 0.51 * h, 0.76 * h))
             for i in range(8)
         ]
@@ -255,19 +254,15 @@ def payment_sign(look: int, params: Params) -> ObjectModel:
 
     def tent(part: Mesh) -> Mesh:
         """What is drawn on an upright plate, on two that lean on each other."""
-        return m.mesh(
-            [(x, y + math.copysign(lean * (z1 - z), y), z) for x, y, z in part.vertices], part.faces
-        )
+        leaning = [(x, y + math.copysign(lean * (z1 - z), y), z) for x, y, z in part.vertices]
+        return m.mesh(leaning, part.faces)
 
     wide = hx - 0.0008
     large, narrow = min(hx / 0.010, z1 / 0.032), (hy + lean * (z1 - 0.036)) / 0.0085
     waves = (
         tent(_waves(half, front, size, sum(room) / 2 - middle)),
         tent(_waves(half, back, large, 0.0)),
-        *(
-            _waves((wide, hy, middle), side, narrow, 0.030 - middle)
-            for side in (SIDES[1], SIDES[3])
-        ),
+        *(_waves((wide, hy, middle), side, narrow, 0.030 - middle) for side in SIDES[1::2]),
     )
     parts = [
         collision(Box((hx, foot, z0 / 2)), (0.0, 0.0, z0 / 2)),

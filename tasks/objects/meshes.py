@@ -6,7 +6,7 @@ Polygons are sequences of (u, v) points, counter-clockwise.
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,6 +102,11 @@ def _inside(p: Point, a: Point, b: Point, c: Point) -> bool:
     return min(_cross(a, b, p), _cross(b, c, p), _cross(c, a, p)) >= -1e-15
 
 
+def ring(polygon: Polygon, z: float, scale: float = 1.0) -> list[Vec3]:
+    """`polygon` (x, y), scaled, at the height `z`."""
+    return [(x * scale, y * scale, z) for x, y in polygon]
+
+
 def loft(rings: Sequence[Sequence[Vec3]], caps: bool = True, under: bool = True) -> Mesh:
     """Skin over `rings` of equally many points, counter-clockwise from above, bottom ring first.
 
@@ -141,24 +146,19 @@ def lathe(profile: Polygon, n: int = 14, caps: bool = True) -> Mesh:
 
 def prism(polygon: Polygon, low: float, high: float, top: float = 1.0, under: bool = True) -> Mesh:
     """`polygon` (x, y) extruded from z = `low` to `high`, its upper face scaled by `top`."""
-    ends = [(x, y, low) for x, y in polygon], [(x * top, y * top, high) for x, y in polygon]
-    return loft(ends, under=under)
+    return loft((ring(polygon, low), ring(polygon, high, top)), under=under)
 
 
 def side_prism(polygon: Polygon, half: float) -> Mesh:
     """`polygon` (y, z) extruded along x to +-`half`."""
-    return mesh(*_turned(prism(polygon, -half, half), lambda u, v, w: (w, u, v)))
+    part = prism(polygon, -half, half)
+    return mesh([(w, u, v) for u, v, w in part.vertices], part.faces)
 
 
 def front_prism(polygon: Polygon, back: float, front: float) -> Mesh:
     """`polygon` (x, z) extruded along y between `back` and `front` (front < back: towards -y)."""
-    return mesh(*_turned(prism(polygon, -back, -front), lambda u, v, w: (u, -w, v)))
-
-
-def _turned(
-    part: Mesh, axes: Callable[[float, float, float], Vec3]
-) -> tuple[list[Vec3], tuple[Face, ...]]:
-    return [axes(*v) for v in part.vertices], part.faces
+    part = prism(polygon, -back, -front)
+    return mesh([(u, -w, v) for u, v, w in part.vertices], part.faces)
 
 
 def slab(hx: float, hy: float, height: float, radius: float, edge: float = 0.0, n: int = 3) -> Mesh:
@@ -168,7 +168,7 @@ def slab(hx: float, hy: float, height: float, radius: float, edge: float = 0.0, 
         return prism(outer, 0.0, height)
     inner = rounded_rectangle(hx - edge, hy - edge, max(radius - edge, radius * 0.4), n)
     levels = ((inner, 0.0), (outer, edge), (outer, height - edge), (inner, height))
-    return loft([[(x, y, z) for x, y in ring] for ring, z in levels])
+    return loft([ring(polygon, z) for polygon, z in levels])
 
 
 def pillow(sections: Sequence[tuple[float, float, float]], n: int = 14, power: float = 1.0) -> Mesh:

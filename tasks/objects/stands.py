@@ -138,11 +138,6 @@ def display_stand(look: int, params: Params) -> ObjectModel:
 
 SCALES = (("white", "#c6f6a0"), ("black", "#7fe8ff"), ("blue", "#c6f6a0"), ("red", "#ffe08a"),
           ("green", "#ffffff"))  # fmt: skip
-SEGMENTS = {"0": "abcdef", "1": "bc", "2": "abged", "3": "abgcd", "4": "fgbc", "5": "afgcd",
-            "6": "afgedc", "7": "abc", "8": "abcdefg", "9": "abcdfg"}  # fmt: skip
-"""Which of the seven bars of a digit are dark: a top, then clockwise b to f, g in the middle."""
-
-
 SCALE_SIZES = (
     (0.1170, 0.1561, 0.0406), (0.1102, 0.1542, 0.0538), (0.1280, 0.1546, 0.1005),
     (0.1312, 0.1548, 0.0242), (0.0985, 0.1549, 0.0638),
@@ -157,10 +152,7 @@ def electronic_scale(look: int, params: Params) -> ObjectModel:
     plate_y, size = 0.012, 0.0415
     steel = m.moved(m.slab(size, size, top - h, 0.012, 0.001, 4), (0.0, plate_y, h))
     window = (0.0, -0.0445)
-    digits = [
-        _digit(d, h + 0.0012, x, window[1], 0.0052, 0.0098)
-        for d, x in (("0", -0.0150), ("0", -0.0042), ("0", 0.0066))
-    ]
+    zeros = [_zero(h + 0.0012, x, window[1], 0.0052, 0.0098) for x in (-0.0150, -0.0042, 0.0066)]
     point = m.flat(m.rectangle(0.0008, 0.0008), h + 0.0012, (-0.0096, window[1] - 0.0048))
     button = m.moved(m.prism(m.ellipse(0.0046, 0.0046, 12), 0.0, 0.0012), (0.035, window[1], h))
     units = m.flat(m.rectangle(0.0016, 0.0022), h + 0.0012, (0.0150, window[1] - 0.003))
@@ -171,7 +163,7 @@ def electronic_scale(look: int, params: Params) -> ObjectModel:
         visual(steel, build.STEEL, roughness=0.3, metallic=0.5),
         visual(m.flat(m.rounded_rectangle(0.0245, 0.0088, 0.003), h + 0.0004, window), build.DARK),
         visual(m.flat(m.rectangle(0.0225, 0.0072), h + 0.0008, window), srgb(light), roughness=0.9),
-        visual(m.merge(*digits, point, units), srgb("#101418")),
+        visual(m.merge(*zeros, point, units), srgb("#101418")),
         visual(button, colour("red") if word != "red" else build.DARK),
     ]
     phrases = build.fill_phrases(
@@ -184,20 +176,15 @@ def electronic_scale(look: int, params: Params) -> ObjectModel:
     return build.model("electronic_scale", made.shapes, "electronic scale", phrases, support=on_top)
 
 
-def _digit(digit: str, z: float, x: float, y: float, w: float, h: float) -> Mesh:
-    """A seven-bar digit lying at `z`, `w` by `h` [m] around (`x`, `y`)."""
+def _zero(z: float, x: float, y: float, w: float, h: float) -> Mesh:
+    """A zero of six bars lying at `z`, `w` by `h` [m] around (`x`, `y`)."""
     t = 0.0007
-    places = {
-        "a": (0.0, h / 2, 1), "b": (w / 2, h / 4, 0), "c": (w / 2, -h / 4, 0),
-        "d": (0.0, -h / 2, 1),
-        "e": (-w / 2, -h / 4, 0), "f": (-w / 2, h / 4, 0), "g": (0.0, 0.0, 1),
-    }  # fmt: skip
-    bars = []
-    for name in SEGMENTS[digit]:
-        u, v, level = places[name]
-        half = (w / 2 - t, t) if level else (t, h / 4 - t * 0.6)
-        bars.append(m.flat(m.rectangle(*half), z, (x + u, y + v)))
-    return m.merge(*bars)
+    level, steep = m.rectangle(w / 2 - t, t), m.rectangle(t, h / 4 - t * 0.6)
+    places = (
+        (level, 0.0, h / 2), (steep, w / 2, h / 4), (steep, w / 2, -h / 4),
+        (level, 0.0, -h / 2), (steep, -w / 2, -h / 4), (steep, -w / 2, h / 4),
+    )  # fmt: skip
+    return m.merge(*(m.flat(bar, z, (x + u, y + v)) for bar, u, v in places))
 
 
 RACKS = (

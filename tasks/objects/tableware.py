@@ -152,11 +152,8 @@ def tray(look: int, params: Params) -> ObjectModel:
     inner = m.rounded_rectangle(hx - wall, hy - wall, 0.017, 5)
     well = [(x * 0.975, y * 0.96) for x, y in inner]
     field = m.rounded_rectangle(hx - 0.024, hy - 0.022, 0.010, 4)
-
-    def ring(outline: m.Polygon, z: float) -> list[tuple[float, float, float]]:
-        return [(x, y, z) for x, y in outline]
-
-    shell = m.loft([ring(foot, 0.0), ring(outer, h), ring(inner, h), ring(well, floor)], False)
+    levels = ((foot, 0.0), (outer, h), (inner, h), (well, floor))
+    shell = m.loft([m.ring(polygon, z) for polygon, z in levels], False)
     grips = [
         m.moved(m.prism(m.rounded_rectangle(0.003, 0.024, 0.0029, 3), 0.0, 0.0012), (x, 0.0, h))
         for x in (wall / 2 - hx, hx - wall / 2)

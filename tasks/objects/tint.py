@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from robospa.tasks.colors import NAMED
 from robospa.tasks.objects.build import fill_phrases
-from robospa.tasks.shapes import ObjectModel, Shape
+from robospa.tasks.shapes import ObjectModel
 
 
 @dataclass(frozen=True)
@@ -45,15 +45,14 @@ def tinted(model: ObjectModel, word: str) -> ObjectModel:
         raise ValueError(f"no colour {word!r}; use one of {', '.join(NAMED)}")
     rule = TINTS[model.asset]
     body, trim = NAMED[word], NAMED["gray" if word != "gray" else "white"]
-
-    def recoloured(index: int, shape: Shape) -> Shape:
-        if index in rule.body:
-            return replace(shape, color=body, metallic=0.0)
-        return replace(shape, color=trim) if index in rule.trim else shape
-
+    shapes = list(model.shapes)
+    for index in rule.body:
+        shapes[index] = replace(shapes[index], color=body, metallic=0.0)
+    for index in rule.trim:
+        shapes[index] = replace(shapes[index], color=trim)
     return replace(
         model,
-        shapes=tuple(recoloured(i, s) for i, s in enumerate(model.shapes)),
+        shapes=tuple(shapes),
         phrases=fill_phrases(
             word,
             f"{{}} {model.noun}", f"{model.noun} in {{}}", f"{{}}-coloured {model.noun}",

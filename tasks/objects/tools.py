@@ -119,12 +119,8 @@ def t_block(look: int, params: Params) -> ObjectModel:
     end, arm, h = 0.035, 0.012, 0.030  # half of its length, half a bar's width, height
     low = end - 2 * arm  # where bar and stem meet
     outline = _tee(end, arm, low, round_ends=kind == 1)
-    top = [(x * 0.965, y * 0.965) for x, y in outline]
-    body = m.loft([
-        [(x, y, 0.0) for x, y in outline],
-        [(x, y, h - 0.0012) for x, y in outline],
-        [(x, y, h) for x, y in top],
-    ])  # fmt: skip
+    levels = ((0.0, 1.0), (h - 0.0012, 1.0), (h, 0.965))
+    body = m.loft([m.ring(outline, z, scale) for z, scale in levels])
     parts = [
         collision(Box((end, arm, h / 2)), (0.0, end - arm, h / 2)),
         collision(Box((arm, (low + end) / 2, h / 2)), (0.0, (low - end) / 2, h / 2)),
