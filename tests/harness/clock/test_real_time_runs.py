@@ -27,6 +27,7 @@ from robospa.results.records.runs import Run, differences, read_run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.report.run_card import score_table
 from robospa.results.scoring.models import IncomparableError, results_of_run
+from robospa.tasks.scene import SUITE
 from robospa.trial import TrialKey
 
 KEYS = trial_keys(6)
@@ -163,15 +164,14 @@ def test_no_bundle_is_made_of_it(tmp_path: Path) -> None:
     run = timed(tmp_path / "a", "200ms", 5).manifest
     settings = structs.replace(
         run.settings,
-        **{name: ("x",) for name in ("embodiment", "mode", "split")},
+        **{name: ("x",) for name in ("embodiment", "mode")},
+        split=("heldout",),
         policy=PolicySettings({"name": "x", "action": "joint"}),
         world=WorldSettings("x"),
     )
-    made = structs.replace(run, suite="x", settings=settings, about=about_machine({}))
+    made = structs.replace(run, suite=SUITE, settings=settings, about=about_machine({}))
     unused = lambda *_: ()  # noqa: E731
-    reference = Reference(
-        unused, unused, unused, "x", suite="x", robots=("x",), modes=("x",), splits=("x",)
-    )
+    reference = Reference(unused, unused, unused, "x", robots=("x",), modes=("x",))
     with pytest.raises(BundleError, match="real time"):
         check_settings(made, reference)
     world = WorldSettings("x", {"control": "fixed_rate"})
