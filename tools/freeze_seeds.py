@@ -26,9 +26,8 @@ from pathlib import Path
 from robospa.harness.robots import embodiments
 from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.running.status import cores
-from robospa.harness.seeds.attempt import Evidence
+from robospa.harness.seeds.attempt import Evidence, Search, searches, sweep_with_bar
 from robospa.harness.seeds.lists import inputs, read_levels, save
-from robospa.harness.seeds.sweep import Search, searches, sweep_with_bar
 from robospa.harness.selection import parse_tasks
 from robospa.results.paper.published import load
 from robospa.tasks.catalog import LEVELS

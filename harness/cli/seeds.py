@@ -42,9 +42,8 @@ def seeds(
     it was stopped.
     """
     from robospa.harness.running.status import cores
-    from robospa.harness.seeds.attempt import Evidence
+    from robospa.harness.seeds.attempt import Evidence, searches, sweep_with_bar
     from robospa.harness.seeds.lists import local_file, local_folder, save
-    from robospa.harness.seeds.sweep import searches, sweep_with_bar
     from robospa.harness.selection import (
         canonical_mode,
         parse_embodiments,

@@ -40,8 +40,7 @@ from robospa.harness.datasets.settings import (
 from robospa.harness.datasets.workers import EpisodeAttempt, EpisodeJob, OpenPool, pool_opener
 from robospa.harness.progress import Bar
 from robospa.harness.running.atomic_file import PARTIAL, replace_file, run_lock, storage_errors
-from robospa.harness.seeds.attempt import Attempt, Evidence
-from robospa.harness.seeds.sweep import Search, sweep
+from robospa.harness.seeds.attempt import Attempt, Evidence, Search, sweep
 from robospa.harness.settings import Compute, SettingsError, changed
 from robospa.registry import did_you_mean
 from robospa.results.records.runs import LOCK

@@ -2,7 +2,6 @@
 
 | module | |
 |---|---|
-| `attempt` | the expert's trial of one seed, the processes that run them, finished ones on disk |
-| `sweep` | the first accepted seeds of many variants, all processes busy |
+| `attempt` | the expert's trial of one seed, finished ones on disk, sweeps of many variants |
 | `lists` | where lists are: shipped with the package, or made by this user; what they depend on |
 """

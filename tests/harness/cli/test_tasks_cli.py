@@ -184,7 +184,7 @@ def test_the_lists_as_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
         row=lambda: [100_000, refused, 100_002],
     )
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr("robospa.harness.seeds.sweep.sweep_with_bar", lambda *_: [found])
+    monkeypatch.setattr("robospa.harness.seeds.attempt.sweep_with_bar", lambda *_: [found])
     words = ("seeds", key.task, "--levels", "2", "--count", "2", "--check", "--json")
     done = robospa(*words)
     (row,) = json.loads(done.out)

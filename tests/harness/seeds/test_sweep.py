@@ -9,8 +9,7 @@ import pytest
 import robospa
 from robospa.harness.running.code_hash import files_of
 from robospa.harness.seeds import lists
-from robospa.harness.seeds.attempt import Attempt, Evidence
-from robospa.harness.seeds.sweep import PATIENCE, Search, sweep
+from robospa.harness.seeds.attempt import PATIENCE, Attempt, Evidence, Search, sweep
 from robospa.harness.selection import list_trials, parse_embodiments, parse_modes, seed_sources
 from robospa.harness.settings import Selection, SettingsError
 from robospa.tasks.seeds import ListKey, NoSeedList, accepted, list_hash
