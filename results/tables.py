@@ -88,7 +88,9 @@ class Table:
 
     def __str__(self) -> str:
         """The table as it stands on a terminal."""
-        return to_text(self)
+        out = io.StringIO()
+        _print(self, plain_console(wide=WIDE, file=out))
+        return out.getvalue().rstrip("\n")
 
     def _repr_html_(self) -> str:
         return html_fragment(self)
@@ -122,13 +124,6 @@ WIDE = 220
 def show(table: Table) -> None:
     """Print `table`; a file gets all columns, however narrow the terminal."""
     _print(table, plain_console(wide=WIDE))
-
-
-def to_text(table: Table) -> str:
-    """What `show` prints into a file."""
-    out = io.StringIO()
-    _print(table, plain_console(wide=WIDE, file=out))
-    return out.getvalue().rstrip("\n")
 
 
 def _print(table: Table, console: Console) -> None:

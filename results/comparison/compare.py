@@ -421,12 +421,9 @@ def both_sides(first: Side, second: Side) -> tuple[ModelResults, ModelResults]:
     """The results of both sides, under different names; raises what `compare` raises."""
     one, two = results_of(first), results_of(second)
     if one.name == two.name:
-        one, two = replace(one, name=_name(first)), replace(two, name=_name(second))
+        names = [str(x.folder) if isinstance(x, Run) else str(x) for x in (first, second)]
+        one, two = replace(one, name=names[0]), replace(two, name=names[1])
     return one, two
-
-
-def _name(side: Side) -> str:
-    return str(side.folder) if isinstance(side, Run) else str(side)
 
 
 def results_of(side: Side) -> ModelResults:

@@ -13,11 +13,11 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.results.comparison.pairs import check_comparable, common_seeds, paired_variants
+from robospa.results.comparison.pairs import check_comparable, paired_variants
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.models import IncomparableError, ModelResults, results_of_records
 from robospa.results.scoring.scores import Variant, weights_of
-from robospa.results.statistics.intervals import Estimate, interval_of, paired_mean
+from robospa.results.statistics.intervals import LEVEL, Estimate, interval_of, paired_mean
 from robospa.results.statistics.significance import p_of_interval
 from robospa.results.tables import Table, TableCell, TableRow, estimate_cell
 
@@ -25,7 +25,6 @@ ENTRY = "real_time"
 """What records keep of real time, in their diagnostics."""
 RESAMPLES = 2000
 SEED = 20_261_123
-CERTAIN = 0.95
 
 
 @dataclass(frozen=True)
@@ -99,8 +98,11 @@ def latency_curve(models: Sequence[ModelResults]) -> LatencyCurve:
         )
     for model in models[1:]:
         check_comparable(models[0], model)
-    shared = [v for v in models[0].trials if all(v in model.trials for model in models)]
-    seeds = {v: found for v in shared if (found := _shared_seeds(models, v))}
+    shared = {
+        v: sorted(set.intersection(*(set(model.trials.get(v, ())) for model in models)))
+        for v in models[0].trials
+    }
+    seeds = {variant: found for variant, found in shared.items() if found}
     if not seeds:
         raise IncomparableError("these runs share no seed: run them on the same ones")
     models = [_cut(model, seeds) for model in models]
@@ -121,13 +123,6 @@ def latency_curve(models: Sequence[ModelResults]) -> LatencyCurve:
         points,
         _half(np.array(latencies), outcomes, weights),
     )
-
-
-def _shared_seeds(models: Sequence[ModelResults], variant: Variant) -> list[int]:
-    found = set(models[0].trials[variant])
-    for model in models[1:]:
-        found &= set(common_seeds(models[0], model, variant))
-    return sorted(found)
 
 
 def _cut(model: ModelResults, seeds: Mapping[Variant, Sequence[int]]) -> ModelResults:
@@ -212,7 +207,7 @@ def _half(
         chosen = rng.integers(0, one.shape[1], (RESAMPLES, one.shape[1]))
         drawn += weight * one[:, chosen].mean(axis=2)
     found = np.array([crossing(latencies, column) for column in drawn.T])
-    tail = 50.0 * (1.0 - CERTAIN)
+    tail = 50.0 * (1.0 - LEVEL)
     ends = np.percentile(found[~np.isnan(found)], [tail, 100.0 - tail], method="inverted_cdf")
     return Estimate(value, float(ends[0]), float(ends[1]), f"bootstrap, {RESAMPLES} resamples")
 

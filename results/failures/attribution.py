@@ -5,8 +5,8 @@ right; one that is tied to none is put right by any new progress. Plain mistakes
 out of turn) count before traces (an object was reached or lifted, and nothing came of it).
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 from robospa.results.records.trial_record import EventRow, TrialRecord
 
@@ -60,7 +60,8 @@ def took(event: EventRow) -> bool:
 
 
 def _worked(events: Sequence[EventRow]) -> set[int]:
-    """Closings that led to a lift of their object before the next closing on it."""
+    """Closings, by the identity of their events, that led to a lift of their object before the next
+    closing on it."""
     found: set[int] = set()
     for i, event in enumerate(events):
         if event["kind"] != "closed":
@@ -75,35 +76,32 @@ def _worked(events: Sequence[EventRow]) -> set[int]:
     return found
 
 
-@dataclass
 class _Reader:
     """Walks through a trial's events and gathers what went wrong."""
 
-    category: str
-    total: int
-    roles: Mapping[str, tuple[int, ...]]
-    done: set[int] = field(default_factory=set)
-    idle: set[int] = field(default_factory=set)
-    """Subtasks that held before anything moved."""
-    ever: set[int] = field(default_factory=set)
-    tried: set[int] = field(default_factory=set)
-    undone: dict[int, float] = field(default_factory=dict)
-    pressed: tuple[str, ...] = ()
-    miss: _Mistake | None = None
-    """The last closing, if it was beside something."""
-    worked: set[int] = field(default_factory=set)
-    """Closings, by the identity of their events, that led to a lift."""
-    progress: float = -1.0
-    mistakes: list[_Mistake] = field(default_factory=list)
+    def __init__(self, record: TrialRecord) -> None:
+        self.category, self.total, self.roles = record.category, record.total, roles_of(record)
+        self.pressed = tuple(record.diagnostics.get("pressed", ()))
+        self.done: set[int] = set()
+        self.idle: set[int] = set()
+        """Subtasks that held before anything moved."""
+        self.ever: set[int] = set()
+        self.tried: set[int] = set()
+        self.undone: dict[int, float] = {}
+        self.miss: _Mistake | None = None
+        """The last closing, if it was beside something."""
+        self.worked = _worked(record.events)
+        self.progress = -1.0
+        self.mistakes: list[_Mistake] = []
+        for event in record.events:
+            self.read(event)
 
     def read(self, event: EventRow) -> None:
         kind = str(event["kind"])
         if event["object"] in self.pressed and kind in PRESSES and self.miss is not None:
             self.mistakes.remove(self.miss)  # it only made the gripper ready to press
             self.miss = None
-        method = getattr(self, f"_{kind}", None)
-        if method is not None:
-            method(event)
+        getattr(self, f"_{kind}", lambda _: None)(event)
 
     def _add(
         self,
@@ -254,22 +252,9 @@ class _Reader:
 
 def root_of(record: TrialRecord) -> Cause | None:
     """The cause of failure of a long-horizon trial; None if nothing was tried."""
-    return _read(record).root()
+    return _Reader(record).root()
 
 
 def mistakes_of(record: TrialRecord) -> list[Cause]:
     """All mistakes of a long-horizon trial, also those that were put right."""
-    return [mistake.cause for mistake in _read(record).mistakes]
-
-
-def _read(record: TrialRecord) -> _Reader:
-    reader = _Reader(
-        record.category,
-        record.total,
-        roles_of(record),
-        pressed=tuple(record.diagnostics.get("pressed", ())),
-        worked=_worked(record.events),
-    )
-    for event in record.events:
-        reader.read(event)
-    return reader
+    return [mistake.cause for mistake in _Reader(record).mistakes]

@@ -1,7 +1,11 @@
 """Draws all figures that the given models and runs have data for, as SVG, PNG and PDF."""
 
-from collections.abc import Sequence
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from robospa.results.comparison.profile import NO_COST, Profile
 from robospa.results.failures.labels import KINDS, NAMES
@@ -11,6 +15,9 @@ from robospa.results.records.manifest import JOINTS, TRACKS
 from robospa.results.scoring.grounding import MEASURES
 from robospa.results.scoring.scores import Scores
 from robospa.results.statistics.intervals import Estimate
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 CAPTIONS = {
     "success": "Success rate by level for every category, with 95 % intervals; "
@@ -24,6 +31,8 @@ CAPTIONS = {
     "profile": "Success under each axis minus that of clean scenes on equal seeds, with 95 % "
     "intervals, the costliest first; filled dots are below p 0.05 after Holm's correction.",
     "latency": "Share of trials whose median, 95th or 99th percentile latency is below a value.",
+    "failures": "Share of each failure type among a task's failed trials, and their number.",
+    "heat": "Success rate [%] of every task at every level; a hatched cell has no result.",
 }
 
 
@@ -41,38 +50,42 @@ def draw(
     Published models get heat maps only where no run is. `beside` are the same series, cut to what
     all of them have, for the figures that hold one against another.
     """
+    mapped = [s for s in all_series if not s.published] or all_series
     made: list[DrawnFigure] = []
+    with styled():
+        found = [_common_figures(all_series, beside or all_series)]
+        for number, series in enumerate(all_series, 1):
+            found.append(_own_figures(series, number * (len(all_series) > 1), series in mapped))
+        for drawn, figure in chain(*found):
+            save(figure, folder, drawn.name, formats)
+            made.append(drawn)
+    return made
+
+
+Figures = Iterator[tuple[DrawnFigure, "Figure"]]
+
+
+def _common_figures(all_series: Sequence[Series], beside: Sequence[Series]) -> Figures:
     tracks = {track: [s for s in all_series if s.track == track] for track in TRACK_ORDER}
     compared = next((found for found in tracks.values() if found), [])
-    together = [s for s in beside or all_series if s.track == compared[0].track] if compared else []
+    together = [s for s in beside if s.track == compared[0].track] if compared else []
     sizes = [len(s.scores.cells) for s in together]
     cut = sizes != [len(s.scores.cells) for s in compared]
     over = f" Over the {sizes[0]} variants that all have." if cut else ""
-    runs = [s for s in all_series if any(r.latency.get("p50", 0) > 0 for r in s.records)]
-    mapped = [s for s in all_series if not s.published] or all_series
-    with styled():
-        if any(s.scores.categories for s in together):
-            save(charts.draw_levels(together), folder, "success", formats)
-            made.append(DrawnFigure("success", "Success against level", CAPTIONS["success"] + over))
-        if any(percent_of(c, "ps") is not None for s in together for c in s.scores.cells.values()):
-            save(charts.draw_progress(together), folder, "progress", formats)
-            made.append(
-                DrawnFigure("progress", "Progress against success", CAPTIONS["progress"] + over)
-            )
-        if sum(map(bool, tracks.values())) > 1:
-            bars = {
-                f"{t}: {s.name}": _rates(s.scores) for t in reversed(TRACK_ORDER) for s in tracks[t]
-            }
-            save(charts.draw_bars(bars, "SR@1 [%]"), folder, "tracks", formats)
-            made.append(DrawnFigure("tracks", "Points, skills and joints", CAPTIONS["tracks"]))
-        if runs:
-            save(charts.draw_latency(runs), folder, "latency", formats)
-            made.append(DrawnFigure("latency", "Latency", CAPTIONS["latency"]))
-        for number, series in enumerate(all_series, 1):
-            made += _own_figures(
-                series, number if len(all_series) > 1 else 0, series in mapped, folder, formats
-            )
-    return made
+    if any(s.scores.categories for s in together):
+        drawn = DrawnFigure("success", "Success against level", CAPTIONS["success"] + over)
+        yield drawn, charts.draw_levels(together)
+    if any(percent_of(c, "ps") is not None for s in together for c in s.scores.cells.values()):
+        drawn = DrawnFigure("progress", "Progress against success", CAPTIONS["progress"] + over)
+        yield drawn, charts.draw_progress(together)
+    if sum(map(bool, tracks.values())) > 1:
+        bars = {
+            f"{t}: {s.name}": _rates(s.scores) for t in reversed(TRACK_ORDER) for s in tracks[t]
+        }
+        drawn = DrawnFigure("tracks", "Points, skills and joints", CAPTIONS["tracks"])
+        yield drawn, charts.draw_bars(bars, "SR@1 [%]")
+    if runs := [s for s in all_series if any(r.latency.get("p50", 0) > 0 for r in s.records)]:
+        yield DrawnFigure("latency", "Latency", CAPTIONS["latency"]), charts.draw_latency(runs)
 
 
 def draw_profile(found: Profile, folder: Path, number: int) -> list[DrawnFigure]:
@@ -91,10 +104,7 @@ def _rates(scores: Scores) -> dict[str, Estimate]:
     return {c: e for (c, n), a in scores.categories.items() if not n and (e := a.values.get("sr1"))}
 
 
-def _own_figures(
-    series: Series, number: int, mapped: bool, folder: Path, formats: Sequence[str]
-) -> list[DrawnFigure]:
-    made = []
+def _own_figures(series: Series, number: int, mapped: bool) -> Figures:
     ending = f"-{number}" if number else ""
     of = f": {series.name}" if number else ""
     found = series.failures
@@ -103,20 +113,15 @@ def _own_figures(
             head: {c: e for c, one in series.grounding.items() if (e := getattr(one, measure))}
             for measure, head in MEASURES.items()
         }
-        name = f"grounding{ending}"
-        save(charts.draw_bars(bars, "share [%]"), folder, name, formats)
-        made.append(DrawnFigure(name, f"Grounding and execution{of}", CAPTIONS["grounding"]))
+        title = f"Grounding and execution{of}"
+        drawn = DrawnFigure(f"grounding{ending}", title, CAPTIONS["grounding"])
+        yield drawn, charts.draw_bars(bars, "share [%]")
     counts = {
         t: found[t] for t in series.scores.tasks_by_category if any(found.get(t, {}).values())
     }
     if counts:
-        name = f"failures{ending}"
-        save(charts.draw_failures(counts, KINDS, NAMES), folder, name, formats)
-        caption = "Share of each failure type among a task's failed trials, and their number."
-        made.append(DrawnFigure(name, f"Failure types{of}", caption))
+        drawn = DrawnFigure(f"failures{ending}", f"Failure types{of}", CAPTIONS["failures"])
+        yield drawn, charts.draw_failures(counts, KINDS, NAMES)
     if series.scores.cells and mapped:
-        name = f"heat{ending}"
-        save(charts.draw_heat(series), folder, name, formats)
-        caption = "Success rate [%] of every task at every level; a hatched cell has no result."
-        made.append(DrawnFigure(name, f"Tasks and levels{of}", caption))
-    return made
+        drawn = DrawnFigure(f"heat{ending}", f"Tasks and levels{of}", CAPTIONS["heat"])
+        yield drawn, charts.draw_heat(series)

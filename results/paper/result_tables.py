@@ -6,7 +6,7 @@ not follow from the per-task tables is a * with what was printed instead.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import groupby
 
 from robospa.results.paper import rounding
@@ -33,6 +33,13 @@ _MARK_NOTES = {
     "none (false discovery rate 5 % over the table).",
     "highest": "Bold: the highest value of a row and level.",
     "none": "",
+}
+LONG_NAMES = {
+    "sr": "Success rate",
+    "sr1": "Success rate by the first choice",
+    "onta": "Object-normalized target accuracy",
+    "onta1": "Object-normalized target accuracy by the first choice",
+    "ps": "Progress score",
 }
 FIRST = (
     "The official rule (SR, ONTA) lets a policy try one object after another: one that reads "
@@ -70,9 +77,8 @@ def summary_table(
             entry = value_cell(column, metric, row, level, column.title in best[row, level])
         return _signed(entry, PRINTED_OTHERWISE * ((row, column.published, head) in wrong))
 
-    title = f"{_long_name(metric)} in percent by category"
-    made = _Made(columns, metric, rows, tuple(heads), tuple(levels), mark, covering, wrong)
-    return made.table(name, title, "", cell)
+    made = (columns, metric, rows, tuple(heads), tuple(levels), mark, covering, wrong)
+    return _made(*made, cell, name, "")
 
 
 def task_table(
@@ -107,77 +113,56 @@ def task_table(
         return _signed(entry, PRINTED_OTHERWISE * (key in wrong))
 
     heads = tuple(f"L{level}" for level in LEVELS)
-    title = f"{_long_name(metric)} in percent by task"
-    made = _Made(columns, metric, rows, heads, LEVELS, mark, covering, wrong)
-    return made.table(name, title, "Task", cell)
+    return _made(columns, metric, rows, heads, LEVELS, mark, covering, wrong, cell, name, "Task")
 
 
-@dataclass(frozen=True)
-class _Made:
-    """What a table of results is made of; `rows` are (row, label, kind)."""
+def _made(
+    columns: Sequence[Column],
+    metric: str,
+    lines: Sequence[tuple[str, str, str]],
+    heads: tuple[str, ...],
+    levels: tuple[int, ...],
+    mark: str,
+    covering: Sequence[Column],
+    wrong: Mapping[tuple[str, str, str], Check],
+    cell: CellMaker,
+    name: str,
+    corner: str,
+) -> Table:
+    """A table of the `lines` (row, label, kind), with marks and notes that look at all of them and
+    at all levels."""
 
-    columns: Sequence[Column]
-    metric: str
-    rows: Sequence[tuple[str, str, str]]
-    heads: tuple[str, ...]
-    levels: tuple[int, ...]
-    mark: str
-    covering: Sequence[Column]
-    wrong: Mapping[tuple[str, str, str], Check]
-
-    def table(
-        self,
-        name: str,
-        title: str,
-        corner: str,
-        cell: CellMaker,
-    ) -> Table:
-        """The table, with marks and notes that look at all rows and levels."""
-        names = [row for row, _, _ in self.rows if row]
-        best = _best(self.columns, self.metric, names, self.levels, self.mark)
-        rows = [one for one in self.rows if not one[0] or self._covered([one[0]], self.heads)]
-        after = [kind for _, _, kind in rows[1:]] + ["section"]
-        pairs = zip(rows, after, strict=False)  # a section without rows is left out
-        rows = [one for one, following in pairs if not one[2] == following == "section"]
-        names = [row for row, _, _ in rows if row]
-        heads = tuple(head for head in self.heads if self._covered(names, [head])) or self.heads
-        lines = [
-            TableRow(label, kind=kind)
-            if not row
-            else TableRow(
-                label,
-                tuple(cell(column, row, head, best) for column in self.columns for head in heads),
-                kind,
-            )
-            for row, label, kind in rows
-        ]
-        whole = [row for row, _, _ in self.rows if row]
-        notes = _notes(self.columns, self.metric, whole, self.levels, self.mark, self.wrong)
-        groups = tuple((column.title, len(heads)) for column in self.columns)
-        return Table(name, title, corner, heads * len(self.columns), tuple(lines), groups, notes)
-
-    def _covered(self, rows: Sequence[str], heads: Sequence[str]) -> bool:
+    def covered(rows: Sequence[str], heads: Sequence[str]) -> bool:
         """Whether any of the columns `covering` has a value in these rows, under these heads."""
-        if not self.covering:
-            return True
-        wanted = [[int(h[1])] if h != "Drop" else self.levels for h in heads]
-        return any(
-            all(column.value(self.metric, row, level) is not None for level in levels)
-            for column in self.covering
+        wanted = [[int(h[1])] if h != "Drop" else levels for h in heads]
+        return not covering or any(
+            all(column.value(metric, row, level) is not None for level in those)
+            for column in covering
             for row in rows
-            for levels in wanted
+            for those in wanted
         )
 
-
-def _long_name(metric: str) -> str:
-    full = {
-        "sr": "Success rate",
-        "sr1": "Success rate by the first choice",
-        "onta": "Object-normalized target accuracy",
-        "onta1": "Object-normalized target accuracy by the first choice",
-        "ps": "Progress score",
-    }
-    return f"{full[metric]} ({METRIC_NAMES[metric]})"
+    rows = [row for row, _, _ in lines if row]
+    best = _best(columns, metric, rows, levels, mark)
+    notes = _notes(columns, metric, rows, levels, mark, wrong)
+    lines = [one for one in lines if not one[0] or covered([one[0]], heads)]
+    after = [kind for _, _, kind in lines[1:]] + ["section"]
+    pairs = zip(lines, after, strict=False)  # a section without rows is left out
+    lines = [one for one, following in pairs if not one[2] == following == "section"]
+    shown = [row for row, _, _ in lines if row]
+    heads = tuple(head for head in heads if covered(shown, [head])) or heads
+    made = tuple(
+        TableRow(
+            label,
+            tuple(cell(column, row, head, best) for column in columns for head in heads if row),
+            kind,
+        )
+        for row, label, kind in lines
+    )
+    groups = tuple((column.title, len(heads)) for column in columns)
+    by = corner.lower() or "category"
+    title = f"{LONG_NAMES[metric]} ({METRIC_NAMES[metric]}) in percent by {by}"
+    return Table(name, title, corner, heads * len(columns), made, groups, notes)
 
 
 def _summary_rows(metric: str) -> list[tuple[str, str]]:
@@ -202,8 +187,17 @@ def _best(
     rivals = [column for column in _one_suite(columns) if column.ranked]
     if mark == "none" or len(rivals) < 2:
         return {place: set() for place in places}
-    find = _supported if mark == "tied" else _highest
-    return dict(zip(places, find(rivals, metric, places), strict=True))
+    if mark == "tied":
+        entries = [[column.sample(metric, *place) for column in rivals] for place in places]
+        marked = [{rivals[n].title for n in found} for found in supported_best(entries)]
+        return dict(zip(places, marked, strict=True))
+    made = {}
+    for place in places:
+        values = {c.title: c.value(metric, *place) for c in rivals}
+        shown = {t: rounding.rounded(value) for t, value in values.items() if value is not None}
+        top = max(shown.values(), default=0.0)
+        made[place] = {title for title, value in shown.items() if value == top}
+    return made
 
 
 def _one_suite(columns: Sequence[Column]) -> list[Column]:
@@ -212,28 +206,6 @@ def _one_suite(columns: Sequence[Column]) -> list[Column]:
     runs = [column for column in columns if not column.published]
     official = all(in_official_world(column.results) for column in runs)
     return list(columns) if official else runs
-
-
-def _supported(
-    columns: Sequence[Column], metric: str, places: Sequence[tuple[str, int]]
-) -> list[set[str]]:
-    entries = [[column.sample(metric, *place) for column in columns] for place in places]
-    return [{columns[n].title for n in marked} for marked in supported_best(entries)]
-
-
-def _highest(
-    columns: Sequence[Column], metric: str, places: Sequence[tuple[str, int]]
-) -> list[set[str]]:
-    made = []
-    for place in places:
-        percents = {
-            c.title: rounding.rounded(value)
-            for c in columns
-            if (value := c.value(metric, *place)) is not None
-        }
-        top = max(percents.values(), default=0.0)
-        made.append({title for title, value in percents.items() if value == top})
-    return made
 
 
 def value_cell(column: Column, metric: str, row: str, level: int, best: bool = False) -> TableCell:

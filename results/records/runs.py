@@ -230,20 +230,11 @@ def read_run(folder: str | Path) -> Run:
     repeated = tuple(key for key, count in counts.items() if count > 1)
     if going_on:
         records = {key: r for key, r in records.items() if not under_way(r)}
-    records = _with_films(records, films_in(folder))
+    there = films_in(folder)  # of which some are made long afterwards
+    for key in records if there else ():
+        if not records[key].video and (name := film_name(key)) in there:
+            records[key] = replace(records[key], video=name)
     return Run(folder, manifest, manifest.keys, records, tuple(torn), repeated, going_on)
-
-
-def _with_films(
-    records: Mapping[TrialKey, TrialRecord], there: frozenset[str]
-) -> dict[TrialKey, TrialRecord]:
-    """`records`, of which each names its film if there is one: some are made long afterwards."""
-    return {
-        key: replace(record, video=name)
-        if there and not record.video and (name := film_name(key)) in there
-        else record
-        for key, record in records.items()
-    }
 
 
 def action_path(folder: Path, key: TrialKey) -> Path:

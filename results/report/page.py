@@ -11,10 +11,10 @@ import json
 import re
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from robospa.results.failures.labels import NAMES, SIMULATED_PER_FILM
 from robospa.results.figures.charts import chance_levels
@@ -36,29 +36,7 @@ from robospa.results.statistics.intervals import Estimate
 from robospa.results.tables import escape_markdown, to_markdown
 from robospa.trial import BASIC, CATEGORIES, CATEGORY_NAMES, DIMENSIONS, METRIC_NAMES
 
-if TYPE_CHECKING:
-    from markupsafe import Markup
-
 FIGURES = "figures"
-
-
-class ShownRate(NamedTuple):
-    """A rate of a card; `bar` has the value and the ends of its interval in percent, None without
-    results."""
-
-    name: str
-    value: str
-    interval: str
-    bar: tuple[float, float, float] | None
-
-
-@dataclass(frozen=True)
-class ScoreCard:
-    """A model's overall rates, official and by the first choice, and `lines` below them."""
-
-    name: str
-    rates: tuple[ShownRate, ...]
-    lines: tuple[str, ...]
 
 
 class LevelPanel(NamedTuple):
@@ -69,17 +47,6 @@ class LevelPanel(NamedTuple):
     title: str
     lines: tuple[tuple[int, str, str, str], ...]
     chance: str
-
-
-@dataclass(frozen=True)
-class PageFigure:
-    """A figure on the page: `file` is its path without ending, from the page's folder."""
-
-    title: str
-    caption: str
-    file: str
-    formats: Sequence[str]
-    svg: Markup
 
 
 def page(
@@ -186,10 +153,10 @@ def progress_of(report: Report) -> list[str]:
     return texts + [""] * (len(report.models) - len(texts))
 
 
-def card(name: str, scores: Scores, listed: int = 0, progress: str = "") -> ScoreCard:
-    """Overall success rate with its interval, and both dimensions; of `listed` variants, those that
-    all models have, if that are more than the `scores` are of. `progress` says what is still to be
-    run: the values are of what has finished."""
+def card(name: str, scores: Scores, listed: int = 0, progress: str = "") -> dict[str, object]:
+    """The `rates` over all, official and by the first choice, with their intervals, and `lines` for
+    below them; of `listed` variants, those that all models have, if that are more than the `scores`
+    are of. `progress` says what is still to be run: the values are of what has finished."""
     overall = scores.overall.get(0)
     lack = "no result yet" if progress else "no value: results are missing"
     rates = [
@@ -210,7 +177,8 @@ def card(name: str, scores: Scores, listed: int = 0, progress: str = "") -> Scor
             covered = f"the {count} of {listed} variants that all have"
         lines.append(f"mean over {covered}, {overall.trials} trials" + " so far" * bool(progress))
     lines += [progress] if progress else []
-    return ScoreCard(name, tuple(r for r in rates if r.bar or r.name == "SR"), tuple(lines))
+    shown = [rate for rate in rates if rate["bar"] or rate["name"] == "SR"]
+    return {"name": name, "rates": shown, "lines": lines}
 
 
 FIRST_RATES = ("sr", "sr1")
@@ -220,13 +188,16 @@ RATE_WORDS = {
 }
 
 
-def _rate(metric: str, found: Estimate | None, lack: str) -> ShownRate:
+def _rate(metric: str, found: Estimate | None, lack: str) -> dict[str, object]:
+    """A rate of a card; `bar` has the value and the ends of its interval in percent, None without
+    results."""
+    name = METRIC_NAMES[metric]
     if found is None:
-        return ShownRate(METRIC_NAMES[metric], "–", lack, None)
+        return {"name": name, "value": "–", "interval": lack, "bar": None}
     text, _, interval = percent(found).partition(" ")
     value, low, high = (round(100 * x, 1) for x in (found.value, found.low, found.high))
     bar = (value, max(0.0, low), min(100.0, high))
-    return ShownRate(METRIC_NAMES[metric], f"{text} %", f"95 % interval {interval}", bar)
+    return {"name": name, "value": f"{text} %", "interval": f"95 % interval {interval}", "bar": bar}
 
 
 def panels(models: Sequence[ModelResults]) -> list[LevelPanel]:
@@ -265,13 +236,17 @@ def _y(value: float) -> float:
     return round(60 - value / 2, 1)
 
 
-def figure(drawing: DrawnFigure, folder: Path, formats: Sequence[str] = FORMATS) -> PageFigure:
-    """A figure for the page: its SVG as markup, and where its files are."""
+def figure(
+    drawing: DrawnFigure, folder: Path, formats: Sequence[str] = FORMATS
+) -> dict[str, object]:
+    """A figure for the page: its `svg` as markup, and the path of its files without ending, from
+    the page's folder."""
     from markupsafe import Markup
 
     svg = (folder / FIGURES / f"{drawing.name}.svg").read_text(encoding="utf-8")
     markup = Markup(inline_svg(svg, drawing.name, f"{drawing.title}. {drawing.caption}"))
-    return PageFigure(drawing.title, drawing.caption, f"{FIGURES}/{drawing.name}", formats, markup)
+    file = f"{FIGURES}/{drawing.name}"
+    return {**asdict(drawing), "file": file, "formats": formats, "svg": markup}
 
 
 def inline_svg(svg: str, prefix: str, label: str) -> str:

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from robospa.results.comparison.compare import by_axis
 from robospa.results.comparison.profile import CLEAN, Pair, Profile, flipped, profile_of
@@ -45,9 +44,6 @@ from robospa.results.scoring.scores import Variant
 from robospa.results.tables import ShownAsTables, Table, TableRow, html_fragment
 from robospa.text import some
 from robospa.trial import BASIC, METRIC_CATEGORIES, METRICS, TrialKey
-
-if TYPE_CHECKING:
-    from markupsafe import Markup
 
 
 @dataclass(frozen=True)
@@ -300,21 +296,12 @@ def _heads(columns: Sequence[Column], levels: Sequence[int], metric: str) -> tup
     return ("L1", "L3", "L5") if metric != "sr" else ("L1", "L5", "Drop")
 
 
-@dataclass(frozen=True)
-class PageTable:
-    """A table on the page; `notes` are those too long to stand below it."""
-
-    title: str
-    html: Markup
-    folded: bool
-    notes: Sequence[str]
-
-
-def for_page(tables: Sequence[ReportTable]) -> list[PageTable]:
-    """The tables for a page; a note stands below the first of the open tables that has it."""
+def for_page(tables: Sequence[ReportTable]) -> list[dict[str, object]]:
+    """Title and `html` of the tables for a page; a note stands below the first of the open tables
+    that has it, and those too long for that are its `notes`."""
     from markupsafe import Markup
 
-    made: list[PageTable] = []
+    made: list[dict[str, object]] = []
     said: set[str] = set()
     for table in tables:
         new = tuple(note for note in table.table.notes if table.folded or note not in said)
@@ -323,7 +310,8 @@ def for_page(tables: Sequence[ReportTable]) -> list[PageTable]:
         long, short = ([n for n in new if (len(n) > LONG) == is_long] for is_long in (True, False))
         rows = tuple(map(_short, table.table.rows))
         html = Markup(html_fragment(replace(table.table, notes=tuple(short), rows=rows)))
-        made.append(PageTable(table.table.title, html, table.folded, long))
+        title, folded = table.table.title, table.folded
+        made.append({"title": title, "html": html, "folded": folded, "notes": long})
     return made
 
 

@@ -7,7 +7,7 @@ turn. So of a spatial category SR@1 is the share of trials with a choice, times 
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import chain
 from typing import NamedTuple
 
@@ -45,15 +45,12 @@ def choices_of(record: TrialRecord) -> list[Choice]:
     return []
 
 
-@dataclass
 class _Steps:
     """Walks through the events of a procedure."""
 
-    record: TrialRecord
-    choices: list[Choice] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        record = self.record
+    def __init__(self, record: TrialRecord) -> None:
+        self.record = record
+        self.choices: list[Choice] = []
         self.roles = roles_of(record)
         self.pressed = set(record.diagnostics.get("pressed", ()))
         self.strict = record.category in ORDERED and record.key.task not in ANY_ORDER

@@ -86,19 +86,13 @@ def fault_rates(records: Iterable[TrialRecord]) -> list[FaultRate]:
     """The rate over all results in `records`, then that of every level."""
     results = [record for record in records if finished(record)]
     levels = sorted({record.key.level for record in results})
-    return [_rate(0, results)] + [
-        _rate(level, [r for r in results if r.key.level == level]) for level in levels
-    ]
-
-
-def _rate(level: int, results: list[TrialRecord]) -> FaultRate:
-    return FaultRate(
-        level,
-        len(results),
-        sum(map(was_repeated, results)),
-        sum(map(repeats, results)),
-        sum(record.end == "policy_error" for record in results),
-    )
+    rates = []
+    for level in (0, *levels):
+        found = [record for record in results if level in (0, record.key.level)]
+        errors = sum(record.end == "policy_error" for record in found)
+        counts = (sum(map(was_repeated, found)), sum(map(repeats, found)), errors)
+        rates.append(FaultRate(level, len(found), *counts))
+    return rates
 
 
 CAUSES = {"policy_error": "withdrawn policy error"}
