@@ -97,7 +97,7 @@ class OfficialSentences:
                 f"({keys}): is the checkout of another version?"
             )
         rng = _generator(scene, split, salt)
-        template, hands = found[int(rng.integers(len(found)))], arms(values)
+        template, hands = _one(found, rng), arms(values)
 
         def text(name: str) -> str:
             value = values[name]

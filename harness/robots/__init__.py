@@ -2,14 +2,16 @@
 
 import math
 import re
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 
 from robospa.geometry import Pose
 from robospa.harness.robots.embodiment import Arm, Embodiment
 from robospa.registry import ROBOTS, UnknownName, find, names
-from robospa.workcell import FixedCamera
+
+NAME = re.compile(r"(?P<left>[^+:]+)(?:\+(?P<right>[^+:]+))?(?::(?P<distance>[^+:]+))?")
+NEAREST, FARTHEST = 0.3, 1.2
+"""Distances between two bases [m] that the table lets stand."""
 
 
 def embodiments() -> tuple[str, ...]:
@@ -19,42 +21,18 @@ def embodiments() -> tuple[str, ...]:
 
 @cache
 def embodiment(name: str) -> Embodiment:
-    """The robot called `name`, an installed one or made of such (`robospa.harness.robots`).
+    """The robot called `name`, an installed one or made of such: NAME, NAME:METRES between the
+    bases, or LEFT+RIGHT:METRES.
 
-    Equal robots have one name: `embodiment(name).name`. ValueError, which says what exists or how
-    names are written, if there is none.
-    """
-    return paired(name, _installed)
-
-
-@cache
-def _installed(name: str) -> Embodiment:
-    try:
-        found = find(ROBOTS, name, "embodiment")
-    except UnknownName as error:
-        raise ValueError(str(error)) from error
-    if not isinstance(found, Embodiment) or found.name != name:
-        raise ValueError(f"entry point {name!r} of {ROBOTS} leads to no Embodiment of that name")
-    return found
-
-
-NAME = re.compile(r"(?P<left>[^+:]+)(?:\+(?P<right>[^+:]+))?(?::(?P<distance>[^+:]+))?")
-NEAREST, FARTHEST = 0.3, 1.2
-"""Distances between two bases [m] that the table lets stand."""
-
-
-def paired(name: str, robot: Callable[[str], Embodiment]) -> Embodiment:
-    """The robot called `name`, made of robots that `robot` finds by their own names.
-
-    Its own name has the distance only if that is not the usual one, and each kind of arm once.
-    Raises ValueError for a name that is not of the forms above, for a distance out of range, and
-    for an arm that stands on a stand together with another one.
+    Equal robots have one name, `embodiment(name).name`: it has the distance only if that is not the
+    usual one, and each kind of arm once. ValueError, which says what exists or how names are
+    written, if there is none, for a distance out of range, and for an arm that stands on a stand
+    together with another one.
     """
     match = NAME.fullmatch(name)
     if match is None:
         raise ValueError(f"{name!r} names no robot; write NAME, NAME:METRES or LEFT+RIGHT:METRES")
-    left = robot(match["left"])
-    right = robot(match["right"] or match["left"])
+    left, right = _installed(match["left"]), _installed(match["right"] or match["left"])
     if match["distance"] is None:
         if right is left:
             return left
@@ -69,11 +47,22 @@ def paired(name: str, robot: Callable[[str], Embodiment]) -> Embodiment:
     return Embodiment(
         name=f"{kinds}:{distance:g}",
         arms=(_at(left.arms[0], -distance / 2), _at(right.arms[1], distance / 2)),
-        cameras=_shared(left.cameras, right.cameras),
+        cameras={n: camera for n, camera in left.cameras.items() if n in right.cameras},
         distance=distance,
         travel_height=max(left.travel_height, right.travel_height),
         highest=min(left.highest, right.highest),
     )
+
+
+@cache
+def _installed(name: str) -> Embodiment:
+    try:
+        found = find(ROBOTS, name, "embodiment")
+    except UnknownName as error:
+        raise ValueError(str(error)) from error
+    if not isinstance(found, Embodiment) or found.name != name:
+        raise ValueError(f"entry point {name!r} of {ROBOTS} leads to no Embodiment of that name")
+    return found
 
 
 def _distance(name: str, text: str) -> float:
@@ -91,9 +80,3 @@ def _distance(name: str, text: str) -> float:
 def _at(arm: Arm, x: float) -> Arm:
     _, y, z = arm.base.position
     return replace(arm, base=Pose((x, y, z), arm.base.rotation))
-
-
-def _shared(
-    left: Mapping[str, FixedCamera], right: Mapping[str, FixedCamera]
-) -> dict[str, FixedCamera]:
-    return {name: camera for name, camera in left.items() if name in right}

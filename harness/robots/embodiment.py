@@ -93,7 +93,7 @@ class Embodiment:
     """A robot: two arms and its fixed cameras, of which one is called "head".
 
     The bases stand `distance` [m] apart, at x = -distance / 2 and distance / 2: another distance
-    makes another robot (`pairs`). One whose arms stand on one stand has none.
+    makes another robot (`robospa.harness.robots`). One whose arms stand on one stand has none.
     """
 
     name: str

@@ -9,7 +9,7 @@ Mesa's software one included. A camera that nobody asks for costs nothing.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -25,7 +25,7 @@ from robospa.harness.sim import cameras as pictures
 from robospa.harness.sim.bodies import to_sapien
 from robospa.harness.sim.furniture import DrawnFurniture
 from robospa.harness.sim.render_bodies import render_body
-from robospa.harness.sim.vulkan import VulkanError, devices
+from robospa.harness.sim.vulkan import Device, VulkanError, devices
 from robospa.harness.world import OTHER, TABLE, CameraView, RenderUnavailable
 from robospa.observation import CameraSpec
 from robospa.tasks.objects import object_model
@@ -266,7 +266,7 @@ class Renderer:
             found = [device for device in devices() if device.name == name]
         except VulkanError:
             found = []
-        return found[0].to_json() if found else {"name": name, "driver": "", "version": ""}
+        return asdict(found[0] if found else Device(name, "", ""))
 
     def close(self) -> None:
         """Free what was drawn."""

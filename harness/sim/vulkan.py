@@ -9,7 +9,7 @@ import ctypes
 import ctypes.util
 import re
 import struct
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 OLDEST_MESA = (24, 3)
@@ -32,10 +32,6 @@ class Device:
     name: str
     driver: str
     version: str
-
-    def to_json(self) -> dict[str, str]:
-        """Plain JSON values."""
-        return asdict(self)
 
     @property
     def too_old(self) -> bool:

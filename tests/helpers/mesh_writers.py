@@ -55,13 +55,6 @@ def hollow_staves(outer: float, inner: float, height: float, count: int) -> list
     return [*staves, prism(inner * ring, 0.0, height / 10)]
 
 
-def merged(meshes: Sequence[Triangles]) -> Triangles:
-    """Meshes end to end as one, which keep their own vertices."""
-    starts = np.cumsum([0, *(len(vertices) for vertices, _ in meshes)])
-    faces = [faces + start for (_, faces), start in zip(meshes, starts, strict=False)]
-    return np.concatenate([vertices for vertices, _ in meshes]), np.concatenate(faces)
-
-
 def palette_png(colours: Sequence[tuple[int, int, int]], side: int = 4) -> bytes:
     """A picture with a square of `side` pixels for each colour, in one row."""
     from PIL import Image

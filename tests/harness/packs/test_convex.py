@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from made_archive import READS_MESHES, SCALE, make_archive, official_pack_in
-from mesh_writers import Piece, glb, glb_bytes, hollow_staves, merged, volume, write_glb, write_obj
+from mesh_writers import Piece, glb, glb_bytes, hollow_staves, volume, write_glb, write_obj
 
 from robospa.geometry import Pose
 from robospa.harness.packs import convex
 from robospa.harness.packs.archive import ArchiveError, open_archive
 from robospa.harness.packs.convex import CORNERS, connected_parts, convex_pieces
-from robospa.harness.packs.mesh_files import RawMesh, read_shapes
+from robospa.harness.packs.mesh_files import RawMesh, joined, read_shapes
 from robospa.harness.packs.official import index
 from robospa.harness.packs.visuals import shaded, thinned
 from robospa.harness.sim.sapien_world import SapienWorld
@@ -96,7 +96,7 @@ def test_normals_are_sharp_at_edges_and_smooth_where_it_is_round() -> None:
 def test_depth_is_that_of_the_floor(height: float) -> None:
     """Of staves about y, their floor a tenth of their height thick."""
     staves = hollow_staves(0.05, 0.04, height, 12)
-    for meshes, share in ((staves, 0.9), ([merged(staves)], 0.0)):
+    for meshes, share in ((staves, 0.9), ([joined(staves)], 0.0)):
         pieces = convex_pieces([(vertices[:, [1, 2, 0]], faces) for vertices, faces in meshes])
         assert convex.depth(pieces) == pytest.approx(share, abs=0.01)
 
@@ -110,7 +110,7 @@ def test_a_model_in_one_node_is_filled_and_named_with_its_tasks(
     found = index(open_archive(root))
     assert not found.filled and not found.filled_text()
     path = root / "objects" / "011_dustbin" / "collision" / "base0.glb"
-    write_glb(path, [Piece(*merged(read_shapes(path, lambda file: file)))], textured=False)
+    write_glb(path, [Piece(*joined(read_shapes(path, lambda file: file)))], textured=False)
     found = index(open_archive(root))
     tasks = {"Put_Bottles_Dustbin", "Place_Bottle_Cup", "Place_Phone_Press_Stapler"}
     assert {*found.filled} == tasks
@@ -157,8 +157,8 @@ def test_what_is_dropped_into_a_hollow_model_ends_inside(
     """The same staves in a node each, and in one, where the official reader fills them too."""
     root = make_archive(tmp_path / "assets", [BIN])
     path, pieces, height = staves_of_bin()
-    joined = Piece(*merged([(piece.vertices, piece.faces) for piece in pieces]))
-    write_glb(root / path, pieces if hollow else [joined], textured=False)
+    whole = Piece(*joined([(piece.vertices, piece.faces) for piece in pieces]))
+    write_glb(root / path, pieces if hollow else [whole], textured=False)
     look = {"look": 0, "pack": "official"}
     block = {"half": [0.01] * 3, "color": [1.0, 0.0, 0.0]}
     objects = (
@@ -197,7 +197,7 @@ def test_pieces_are_those_of_the_official_reader(kind: str, tmp_path: Path) -> N
     elif kind == "nodes.glb":
         write_glb(path, pieces)
     else:
-        write_obj(path, pieces if kind == "objects.obj" else [Piece(*merged(staves))])
+        write_obj(path, pieces if kind == "objects.obj" else [Piece(*joined(staves))])
     shapes = read_shapes(path, lambda path: path)
     made = [len(corners) for corners, _ in convex_pieces(shapes)]
     assert sorted(made) == of_sapien(path)

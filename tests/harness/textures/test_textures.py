@@ -52,11 +52,6 @@ def test_splits_have_the_same_kinds_and_no_combination_in_common() -> None:
         assert len(seen) + len(unseen) == kind.styles * len(kind.colors)
 
 
-def test_textures_of_a_split_differ() -> None:
-    images = [MadeTextures.image(Texture(UNSEEN, index)).tobytes() for index in range(12)]
-    assert len(set(images)) == 12
-
-
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.make.__name__)
 def test_every_kind_paints_a_picture(kind: textures.Material) -> None:
     for style in (0, kind.styles - 1):
