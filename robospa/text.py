@@ -8,7 +8,7 @@ of this module prints them as they are; what shall be coloured is a `rich.text.T
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -68,6 +68,9 @@ def markdown_table(
     return "\n".join([lines[0], rule, *lines[1:]])
 
 
+PLAIN: dict[str, Any] = {"markup": False, "emoji": False, "highlight": False}
+
+
 def plain_console(
     wide: int | None = None, file: IO[str] | None = None, quiet: bool = False
 ) -> Console:
@@ -77,13 +80,10 @@ def plain_console(
     """
     from rich.console import Console
 
-    def made(width: int | None) -> Console:
-        return Console(
-            width=width, file=file, quiet=quiet, markup=False, emoji=False, highlight=False
-        )
-
-    console = made(None)
-    return console if wide is None or console.is_terminal else made(wide)
+    console = Console(file=file, quiet=quiet, **PLAIN)
+    if wide is None or console.is_terminal:
+        return console
+    return Console(width=wide, file=file, quiet=quiet, **PLAIN)
 
 
 def recording_console(columns: int) -> Console:
@@ -92,17 +92,8 @@ def recording_console(columns: int) -> Console:
 
     from rich.console import Console
 
-    return Console(
-        record=True,
-        file=io.StringIO(),
-        width=columns,
-        markup=False,
-        emoji=False,
-        highlight=False,
-        force_terminal=True,
-        force_jupyter=False,
-        color_system="truecolor",
-    )
+    shown = {**PLAIN, "force_terminal": True, "force_jupyter": False, "color_system": "truecolor"}
+    return Console(record=True, file=io.StringIO(), width=columns, **shown)
 
 
 def size_text(size: float) -> str:

@@ -216,13 +216,8 @@ class Workcell:
         low = self.table.top
         left, right, top, bottom = self.head.box(x, y, radius, low, low + height)
         free_x, free_y = margin[0] * WIDTH, margin[1] * HEIGHT
-        inside: Mask = (
-            (left >= free_x)
-            & (right <= WIDTH - free_x)
-            & (top >= free_y)
-            & (bottom <= HEIGHT - free_y)
-        )
-        return inside
+        inside: Mask = (left >= free_x) & (right <= WIDTH - free_x)
+        return inside & (top >= free_y) & (bottom <= HEIGHT - free_y)
 
     def view_span(
         self, y: float, radius: float = 0.0, height: float = 0.0, margin: float = 0.02

@@ -112,7 +112,6 @@ def with_table_raised(scene: Scene, rise: float) -> Scene:
 
     What stands on the floor, too, as officially: a bin would else stick out beside a lower table.
     """
-
     return replace(
         scene,
         objects=tuple(shifted(item, (0.0, 0.0, rise)) for item in scene.objects),

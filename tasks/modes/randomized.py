@@ -64,16 +64,9 @@ def _height(scene: Scene, part: Part, strength: float, textures: str) -> Scene:
 
 def _texture(scene: Scene, part: Part, strength: float, textures: str) -> Scene:
     rng = part("textures")
-    wall, table = (Texture(textures, int(rng.integers(TEXTURES[textures]))) for _ in range(2))
-    wall_plain, table_plain = (rng.random() >= strength for _ in range(2))
-    return replace(
-        scene,
-        surroundings=replace(
-            scene.surroundings,
-            wall=None if wall_plain else wall,
-            table=None if table_plain else table,
-        ),
-    )
+    drawn = [Texture(textures, int(rng.integers(TEXTURES[textures]))) for _ in range(2)]
+    wall, table = (texture if rng.random() < strength else None for texture in drawn)
+    return replace(scene, surroundings=replace(scene.surroundings, wall=wall, table=table))
 
 
 def _light(scene: Scene, part: Part, strength: float, textures: str) -> Scene:

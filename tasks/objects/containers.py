@@ -130,8 +130,6 @@ BASKETS = (
     ("#e9e4d8", "#c9c2b2", "white", "light blue"), ("#4a2d18", "#6e4626", "dark brown", "red"),
     ("#8b8f94", "#b4b8bc", "grey", "yellow"),
 )  # fmt: skip
-
-
 BASKET_SIZES = (
     (0.1931, 0.1360, 0.0640), (0.1906, 0.1395, 0.0520), (0.2102, 0.1718, 0.0864),
     (0.1917, 0.1398, 0.0477), (0.1900, 0.1900, 0.0774),
@@ -304,8 +302,6 @@ TRASH_BIN_SIZES = (
     (0.0854, 0.1356),
 )  # fmt: skip
 """Width at the rim (of the official contact points) and official height [m] of each look."""
-
-
 WALL = 0.0064
 """Thickness of its walls [m]: some grippers' closed fingers stay 5.4 mm apart."""
 

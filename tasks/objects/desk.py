@@ -190,8 +190,6 @@ BELLS = (
     ("#cfd3d8", "#1c1c20", "silver", "black", 0.55), ("#d9a62a", "#5a3216", "gold", "brown", 0.45),
     ("#c8202a", "#1c1c20", "red", "black", 0.0), ("#2257bd", "#d5d9de", "blue", "silver", 0.0),
 )  # fmt: skip
-
-
 BELL_SIZES = ((0.0780, 0.0676), (0.0734, 0.0530), (0.0780, 0.0676), (0.0734, 0.0530))
 """Diameter and official height [m] of each look: officially bells stand 8 cm apart."""
 

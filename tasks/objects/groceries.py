@@ -103,8 +103,6 @@ PERFUMES = (
     ("#b48ad6", "silver", "purple", "round"), ("#8fce9f", "gold", "green", "round"),
     ("#2a2b31", "gold", "black", "square"), ("#f0c24e", "black", "yellow", "round"),
 )  # fmt: skip
-
-
 PERFUME = (0.050, 0.0205, 0.108)
 """Half width and half depth of a flask, and its height up to the collar [m]."""
 PERFUME_CAP, PERFUME_HEIGHT, PERFUME_GRIP = 0.0165, 0.155, 0.132

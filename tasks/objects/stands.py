@@ -16,8 +16,6 @@ PHONE_STANDS = (
     ("silver", "black"), ("black", "grey"), ("blue", "light blue"), ("pink", "purple"),
     ("green", "dark green"), ("orange", "black"),
 )  # fmt: skip
-
-
 PHONE_STAND_SIZES = (
     (0.0767, 0.1380, 0.1937), (0.0854, 0.1315, 0.1701), (0.0872, 0.1104, 0.1420),
     (0.0800, 0.1036, 0.1266), (0.0710, 0.1278, 0.1542), (0.1080, 0.1100, 0.1542),
@@ -103,8 +101,6 @@ DISPLAYS = (
     ("white", "navy", "white"), ("black", "gold", "black"), ("brown", "cream", "wooden"),
     ("gold", "red", "gold"), ("blue", "silver", "blue"), ("green", "cream", "green"),
 )  # fmt: skip
-
-
 DISPLAY_SIZES = (
     (0.1935, 0.1064, 0.0742), (0.1935, 0.1240, 0.0732), (0.1918, 0.1315, 0.0714),
     (0.1933, 0.0623, 0.0448), (0.1935, 0.1376, 0.0431), (0.1935, 0.1064, 0.0742),

@@ -14,14 +14,10 @@ HAMMERS = (
     ("black", "tan", "black"), ("red", "tan", "red"), ("brown", "tan", "wooden"),
     ("blue", "yellow", "blue"), ("silver", "black", "metal"), ("green", "grey", "green"),
 )  # fmt: skip
-
-
 HAMMER_STRIKES = 0.0632
 """How far [m] the striking face is from where the handle is held (official points)."""
 HAMMER_HANDLE = 0.0514
 """How high [m] the handle is above the striking face (official points)."""
-
-
 CLAW = (
     (0.0000, 0.0150, -0.020, 0.022, 0.068), (0.0010, 0.0140, -0.013, 0.014, 0.092),
     (0.0040, 0.0135, -0.017, 0.004, 0.116), (0.0070, 0.0128, -0.024, -0.018, 0.1365),
@@ -159,8 +155,6 @@ WOODS = (
     ("#dcb47c", "#c0935a", "light"), ("#7d4e2a", "#5f381c", "dark"), ("#b8322a", "#dcb47c", "red"),
     ("#2f62b0", "#dcb47c", "blue"), ("#3d8c47", "#dcb47c", "green"),
 )  # fmt: skip
-
-
 WOOD_SIZES = (
     (0.1507, 0.0379, 0.0522), (0.0560, 0.0560, 0.1018), (0.1507, 0.0379, 0.0522),
     (0.0560, 0.0560, 0.1018), (0.1507, 0.0379, 0.0522),

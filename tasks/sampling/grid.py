@@ -39,10 +39,8 @@ class Grid:
         """Where the centre may be when it is at `y`, so that the near row is in view."""
         near = y - (self.rows - 1) / 2 * self.pitch_y - self.jitter[1]
         half = (self.columns - 1) / 2 * self.pitch_x + self.jitter[0]
-        footprint, axis = (
-            workcell.view_span(near, self.radius, margin=self.margin),
-            workcell.view_span(near, 0.0, self.tall, self.margin),
-        )
+        footprint = workcell.view_span(near, self.radius, margin=self.margin)
+        axis = workcell.view_span(near, 0.0, self.tall, self.margin)
         low = max(self.x[0], footprint[0] + half, axis[0] + half)
         high = min(self.x[1], footprint[1] - half, axis[1] - half)
         if low > high:

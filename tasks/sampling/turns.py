@@ -61,21 +61,12 @@ class Outline:
 def outline(asset: str, params: Params) -> Outline:
     """The outline of an asset. Its size must not depend on other parameters than the look."""
     if asset == "block":
-        return _block(tuple(params["half"]))
-    return _look(asset, params.get("look", 0))
+        return _outline(asset, half=tuple(params["half"]))
+    return _outline(asset, look=params.get("look", 0))
 
 
 @cache
-def _look(asset: str, look: int) -> Outline:
-    return _outline(asset, {"look": look})
-
-
-@cache
-def _block(half: tuple[float, float, float]) -> Outline:
-    return _outline("block", {"half": list(half)})
-
-
-def _outline(asset: str, params: Params) -> Outline:
+def _outline(asset: str, **params: int | tuple[float, ...]) -> Outline:
     model = object_model(asset, params)
     points = np.concatenate([points_of(shape)[:, :2] for shape in model.shapes])
     angles = 2 * math.pi * np.arange(FINE) / FINE
