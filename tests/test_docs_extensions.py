@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 from command_line import robospa
 from installed import EXAMPLES, installed
-from standins import QUICK, STATE, TRIAL, observation
+from standins import QUICK
+from standins_http import STATE, TRIAL, observation
 from wire_helpers import serving
 
 from robospa.clients import check_options, connect

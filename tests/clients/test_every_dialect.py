@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 from run_fakes import FakePolicy
-from standins import DIALECTS, QUICK, TRIAL, answered, joint_chunk, observation, talking
+from standins import DIALECTS, QUICK, answered, talking
+from standins_http import TRIAL, joint_chunk, observation
 from wire_helpers import serving
 
 from robospa.clients import connect, dialect

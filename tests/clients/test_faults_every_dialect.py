@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from standins import DIALECTS, TRIAL, joint_chunk, observation
+from standins import DIALECTS
+from standins_http import TRIAL, joint_chunk, observation
 
 from robospa.clients import connect, dialect
 from robospa.protocol.client import RemotePolicy

@@ -7,17 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 from model_fakes import COLORS, close, color_of, first, install, seen, tensor, trial
-from standins import (
-    HEAD,
-    LEFT,
-    QUICK,
-    RIGHT,
-    STATE,
-    Go1,
-    first_request,
-    image,
-    observation,
-)
+from standins import QUICK, first_request
+from standins_http import HEAD, LEFT, RIGHT, STATE, Go1, image, observation
 from wire_helpers import self_signed
 
 from robospa.clients import connect, go1

@@ -8,21 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from standins import (
-    HEAD,
-    LEFT,
-    ND,
-    QUICK,
-    STATE,
-    TRIAL,
-    Gr00t,
-    answered,
-    first_request,
-    image,
-    joint_chunk,
-    observation,
-    talking,
-)
+from standins import QUICK, Gr00t, answered, first_request, talking
+from standins_http import HEAD, LEFT, ND, STATE, TRIAL, image, joint_chunk, observation
 
 from robospa.clients import connect
 from robospa.clients.numpy_msgpack import npy_form, read_npy

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 from run_fakes import SPEC, FakePolicy
-from standins import QUICK, Go1, Status, answered, joint_chunk, observation
+from standins import QUICK, answered
+from standins_http import Go1, Status, joint_chunk, observation
 from wire_helpers import port_that
 
 from robospa.action_space import ActionSpace

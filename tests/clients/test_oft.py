@@ -5,19 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from standins import (
-    LEFT,
-    RIGHT,
-    STATE,
-    TRIAL,
-    Oft,
-    answered,
-    first_request,
-    image,
-    joint_chunk,
-    observation,
-    talking,
-)
+from standins import answered, first_request, talking
+from standins_http import LEFT, RIGHT, STATE, TRIAL, Oft, image, joint_chunk, observation
 
 from robospa.protocol.errors import PolicyAnswerError, ServerError
 

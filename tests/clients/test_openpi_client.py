@@ -11,22 +11,8 @@ import msgpack
 import numpy as np
 import pytest
 from model_fakes import first, install, seen, trial
-from standins import (
-    HEAD,
-    LEFT,
-    OPENPI,
-    QUICK,
-    RIGHT,
-    STATE,
-    TRIAL,
-    Family,
-    OpenPi,
-    answered,
-    image,
-    joint_chunk,
-    observation,
-    talking,
-)
+from standins import QUICK, Family, OpenPi, answered, talking
+from standins_http import HEAD, LEFT, OPENPI, RIGHT, STATE, TRIAL, image, joint_chunk, observation
 from websockets.protocol import State
 from wire_helpers import until
 

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from standins import Go1, OpenPi, RoboTwin, VlaEval, XPolicyLab, XVla
+from standins import OpenPi, RoboTwin, VlaEval, XPolicyLab
+from standins_http import Go1, XVla
 
 from robospa.baselines.oracle import Oracle
 from robospa.clients import connect

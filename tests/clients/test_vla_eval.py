@@ -10,23 +10,8 @@ from typing import Any
 import msgpack
 import numpy as np
 import pytest
-from standins import (
-    EE,
-    HEAD,
-    LEFT,
-    QUICK,
-    RIGHT,
-    STATE,
-    TRIAL,
-    RoboTwin,
-    VlaEval,
-    XPolicyLab,
-    answered,
-    image,
-    joint_chunk,
-    observation,
-    talking,
-)
+from standins import QUICK, RoboTwin, VlaEval, XPolicyLab, answered, talking
+from standins_http import EE, HEAD, LEFT, RIGHT, STATE, TRIAL, image, joint_chunk, observation
 
 from robospa.clients import check_options, connect
 from robospa.protocol.errors import (

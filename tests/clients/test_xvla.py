@@ -5,21 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 from model_fakes import COLORS, close, color_of, first, install, seen, tensor, trial
-from standins import (
-    EE,
-    HEAD,
-    LEFT,
-    RIGHT,
-    STATE,
-    TRIAL,
-    XVla,
-    answered,
-    first_request,
-    image,
-    joint_chunk,
-    observation,
-    talking,
-)
+from standins import answered, first_request, talking
+from standins_http import EE, HEAD, LEFT, RIGHT, STATE, TRIAL, XVla, image, joint_chunk, observation
 
 from robospa.clients import xvla
 from robospa.clients.model_policy import ModelMissing

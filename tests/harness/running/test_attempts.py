@@ -237,7 +237,7 @@ def test_a_wrong_option_is_mended_while_no_trial_has_a_result(tmp_path: Path) ->
 
 def test_a_server_that_stops_the_run_within_a_trial_has_had_an_attempt(tmp_path: Path) -> None:
     """As by HTTP 401 in the middle: else a resume would give the trial back."""
-    from standins import Go1, Status
+    from standins_http import Go1, Status
 
     class Refusing(Go1):
         def act(self, body: bytes) -> Any:
