@@ -171,14 +171,9 @@ def check_folder(folder: Path, resume: bool) -> None:
         raise RunError(f"{folder} is neither empty nor a run; choose another --out")
 
 
-def _allowed_changes(old: Part, new: Part, tasks: Collection[str] | None) -> Part:
+def _allowed_changes(old: Part, new: Part, tasks: Collection[str]) -> Part:
     """`old` settings, or what is known about policies, with what may be `new`: the policies of
-    tasks that have no result yet.
-
-    `tasks` are those with a result; None if that is not known, so that nothing may be new.
-    """
-    if tasks is None:
-        return old
+    tasks that have no result yet, unlike `tasks`."""
     before, now = old.policies, new.policies
     if not tasks:
         changed = structs.replace(old, policy=new.policy, policies=now or before)
@@ -192,9 +187,7 @@ def _allowed_changes(old: Part, new: Part, tasks: Collection[str] | None) -> Par
     return structs.replace(old, policy=new.policy, policies={**before, **free})
 
 
-def open_run(
-    folder: Path, manifest: RunManifest, resume: bool, tasks: Collection[str] | None = None
-) -> None:
+def open_run(folder: Path, manifest: RunManifest, resume: bool, tasks: Collection[str]) -> None:
     """Start the run in `folder` or go on with it; `tasks` are those with a result.
 
     A policy of a task without a result may change: a wrong option that stopped the run is mended

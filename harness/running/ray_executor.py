@@ -126,9 +126,9 @@ class RayExecutor(Executor):
         self._gone = False
         self._ray = join_cluster(settings.address)
         try:
-            address = settings.address or ""
-            remote = address.startswith("ray://")
-            self._head = address if remote else self._ray.get_runtime_context().gcs_address
+            self._head = settings.address or ""
+            if not self._head.startswith("ray://"):
+                self._head = self._ray.get_runtime_context().gcs_address
             self._actor_class = self._ray.remote(WorkerActor)
             self._affinity = import_module("ray.util.scheduling_strategies")
             self._count_nodes()

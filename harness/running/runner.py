@@ -308,7 +308,11 @@ class Runner:
                     slot.answers = message.answers
                     self._scheduler.servers[slot.target].add_answers(new, message.answer_ms)
             case TrialBegins():
-                self._begin(slot)
+                # On disk, as one that the end of this driver cuts off, before the policy has it.
+                job = slot.job
+                assert job is not None
+                self._losses.write(job.key, CUT_OFF.message, (*job.retries, CUT_OFF))
+                slot.worker.send(Proceed())
             case TrialDone():
                 self._complete(slot, message.record)
             case Fatal():
@@ -358,14 +362,6 @@ class Runner:
             self.on_note(f"workers wait while cores idle: {more} more, {total} now")
 
     # --- trials -----------------------------------------------------------------------------------
-
-    def _begin(self, slot: Slot) -> None:
-        """Put the attempt of `slot` on disk, as one that the end of this driver cuts off, and let
-        the policy have the trial."""
-        job = slot.job
-        assert job is not None
-        self._losses.write(job.key, CUT_OFF.message, (*job.retries, CUT_OFF))
-        slot.worker.send(Proceed())
 
     def _complete(self, slot: Slot, record: TrialRecord) -> None:
         job, slot.job, target = slot.job, None, slot.target

@@ -196,8 +196,6 @@ class ServerStats:
     task: str = ""
     """Base task of the trial that was last sent there."""
     trials: int = 0
-    switches: int = 0
-    """How often the base task changed from one trial to the next."""
     failures: int = 0
     failing_since: float = 0.0
     """When the first of the present failures was."""
@@ -228,7 +226,6 @@ class ServerStats:
 
     def start_trial(self, task: str, now: float) -> None:
         self.wait_per_worker = self.wait(now)
-        self.switches += self.task not in ("", task)
         self.task = task
         self.running += 1
 

@@ -185,6 +185,8 @@ for name in sorted(sys.modules):
 
 KEYS_MANIFEST = tuple(TrialKey("Pick_Fake", level, seed) for level in (1, 2) for seed in (5, 6))
 SETTINGS = RunSettings(policy=PolicySettings({"name": "fake", "horizon": 4}), split=("heldout",))
+RUN = ("Pick_Fake",)
+"""The tasks that have a result."""
 MANIFEST = make_manifest(SETTINGS, KEYS_MANIFEST, RunAbout(code="a", versions={"numpy": "2"}))
 
 
@@ -207,11 +209,11 @@ def test_the_seed_hash_ignores_order_and_nothing_else() -> None:
 
 
 def test_resuming_only_counts_drivers_and_kinds_of_processors(tmp_path: Path) -> None:
-    open_run(tmp_path, MANIFEST, resume=False)
+    open_run(tmp_path, MANIFEST, False, ())
     two = tuple(Processor(vendor) for vendor in ("A", "B"))
     for there in (two[:1], two, two[:1]):
         about = structs.replace(MANIFEST.about, machine={"name": "another"}, processors=there)
-        open_run(tmp_path, structs.replace(MANIFEST, about=about), resume=True)
+        open_run(tmp_path, structs.replace(MANIFEST, about=about), True, RUN)
     about = structs.replace(MANIFEST.about, drivers=4, processors=two)
     assert read_manifest(tmp_path) == structs.replace(MANIFEST, about=about)
 
@@ -238,7 +240,7 @@ def test_another_run_is_not_gone_on_with(
     write_manifest(tmp_path, MANIFEST)
     edit(tmp_path, **changes)
     with pytest.raises(RunError, match=words):
-        open_run(tmp_path, MANIFEST, resume=True)
+        open_run(tmp_path, MANIFEST, True, RUN)
 
 
 @pytest.mark.parametrize(
@@ -275,10 +277,10 @@ def test_a_folder_that_holds_something_is_left_alone(tmp_path: Path) -> None:
         (tmp_path / ("n" * 300), False, "cannot be a folder: File name too long"),
     ):
         with pytest.raises(RunError, match=words):
-            open_run(folder, MANIFEST, resume)
-    open_run(tmp_path / "run", MANIFEST, resume=False)
+            open_run(folder, MANIFEST, resume, ())
+    open_run(tmp_path / "run", MANIFEST, False, ())
     with pytest.raises(RunError, match="--resume"):
-        open_run(tmp_path / "run", MANIFEST, resume=False)
+        open_run(tmp_path / "run", MANIFEST, False, ())
 
 
 def test_a_driver_killed_before_its_first_file_leaves_a_folder_to_start_in(tmp_path: Path) -> None:
