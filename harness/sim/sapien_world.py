@@ -304,14 +304,14 @@ class SapienWorld:
             )
         from robospa.harness.sim.renderer import Renderer
 
-        if self._robot_assets == "builtin":
-            self._renderer = Renderer()
-            return self._renderer
-        from robospa.harness.packs.archive import open_archive
-        from robospa.harness.packs.visuals import robot_skins
+        skins = None
+        if self._robot_assets != "builtin":
+            from robospa.harness.packs.archive import open_archive
+            from robospa.harness.packs.visuals import robot_skins
 
-        full = self._robot_assets == "official-full"
-        self._renderer = Renderer(partial(robot_skins, open_archive(), full=full))
+            full = self._robot_assets == "official-full"
+            skins = partial(robot_skins, open_archive(), full=full)
+        self._renderer = Renderer(skins)
         return self._renderer
 
     def bodies(self) -> dict[str, Pose]:
