@@ -173,9 +173,8 @@ def _controls(oven: Oven, trim: Color) -> list[Shape]:
 
 
 def _door(oven: Oven, color: Color, metallic: float) -> list[Shape]:
-    box, at = _box(
-        (oven.left, oven.panel - 0.001), (oven.front, oven.behind), (oven.foot, oven.top)
-    )
+    deep, tall = (oven.front, oven.behind), (oven.foot, oven.top)
+    box, at = _box((oven.left, oven.panel - 0.001), deep, tall)
     right = oven.bar[0] - 0.012
     wide, high = (right - oven.left - 0.014) / 2, box.half[2] - 0.020
     window = m.rounded_rectangle(wide, high, 0.008)

@@ -142,10 +142,8 @@ def playing_cards(look: int, params: Params) -> ObjectModel:
     diamond = m.flat([(0.0085, 0.0), (0.0, 0.013), (-0.0085, 0.0), (0.0, -0.013)], top + 0.001)
     corner = [(0.0025, 0.0), (0.0, 0.0035), (-0.0025, 0.0), (0.0, -0.0035)]
     small = [m.flat(corner, top + 0.001, at) for at in ((0.009, 0.0165), (-0.009, -0.0165))]
-    edges = [
-        on_side(m.rectangle(w - 0.004, 0.0045), half, side)
-        for side, w in zip(SIDES, (half[0], half[1], half[0], half[1]), strict=True)
-    ]
+    widths = zip(SIDES, 2 * half[:2], strict=True)
+    edges = [on_side(m.rectangle(w - 0.004, 0.0045), half, side) for side, w in widths]
     parts = [
         solid(Box(half), colour(base), (0.0, 0.0, half[2])),
         visual(m.merge(frame, diamond, *small, *edges), srgb(mark)),
@@ -158,9 +156,8 @@ def playing_cards(look: int, params: Params) -> ObjectModel:
     wide, long, tall = CARD_SIZES[look]
     made = build.fitted(parts, CARD_SIZES[look])
     grasps = build.box_grasps(wide / 2, long / 2, tall / 2, 0.6)
-    return build.model(
-        "playing_cards", made.shapes, "pack of playing cards", phrases, grasps, mass=0.01
-    )
+    noun = "pack of playing cards"
+    return build.model("playing_cards", made.shapes, noun, phrases, grasps, mass=0.01)
 
 
 SOAPS: tuple[tuple[Color, str], ...] = (
@@ -181,15 +178,13 @@ def soap(look: int, params: Params) -> ObjectModel:
     dark: Color = (color[0] * 0.72, color[1] * 0.72, color[2] * 0.72)
     pale: Color = (min(1, color[0] * 1.12), min(1, color[1] * 1.12), min(1, color[2] * 1.12))
     top = 2 * half[2]
-    letters = [
-        m.flat(m.rectangle(0.0022, 0.0026, 0.006 * i - 0.009), top + 0.0009) for i in range(4)
-    ]
+    bars = [m.rectangle(0.0022, 0.0026, 0.006 * i - 0.009) for i in range(4)]
     parts = [
         collision(Box((half[0], half[1] - 0.0005, half[2])), (0.0, 0.0, half[2])),
         visual(m.slab(half[0], half[1], top, 0.008, 0.004, 4), color, roughness=0.35),
         visual(m.flat(m.ellipse(0.019, 0.0088, 18), top + 0.0003), dark),
         visual(m.flat(m.ellipse(0.0172, 0.0073, 18), top + 0.0006), pale),
-        visual(m.merge(*letters), dark),
+        visual(m.merge(*(m.flat(bar, top + 0.0009) for bar in bars)), dark),
     ]
     phrases = build.fill_phrases(
         word, "{} soap bar", "{} bar of soap", "bar of {} soap", "{} soap", "soap bar in {}",

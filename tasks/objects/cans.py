@@ -81,12 +81,11 @@ def can(look: int, params: Params) -> ObjectModel:
     bottom = [(r - 0.007, 0.0), (r - 0.005, 0.001), (r - 0.001, 0.009)]
     top = [(r - 0.001, h - 0.012), (r - 0.0055, h - 0.003), (r - 0.005, h), (r - 0.0068, h)]
     top += [(r - 0.0075, h - 0.003)]
+    ends = m.merge(m.lathe(bottom, 16), m.lathe(top, 16))
     parts = [
         collision(Cylinder(r, h / 2), (0.0, 0.0, h / 2)),
         visual(m.lathe(body, 16, False), colour(base), roughness=0.35, metallic=0.2),
-        visual(
-            m.merge(m.lathe(bottom, 16), m.lathe(top, 16)), build.STEEL, roughness=0.3, metallic=0.5
-        ),
+        visual(ends, build.STEEL, roughness=0.3, metallic=0.5),
         visual(_sign(sign, r, h), colour(mark), roughness=0.4),
         visual(_tab(h - 0.0026), srgb("#7f858c"), roughness=0.3, metallic=0.4),
     ]
@@ -141,16 +140,14 @@ def bottle(look: int, params: Params) -> ObjectModel:
     body += [(neck, 0.92 * h)]
     lid = [(screw, 0.88 * h), (screw, h - 0.001), (screw - 0.001, h)]
     middle = 0.36 * h
+    wrap = [(r + 0.0004, middle - 0.15 * h), (r + 0.0004, middle + 0.15 * h)]
     emblem = {"white": colour("red"), "yellow": colour("green")}.get(label, build.PAPER)
     parts = [
         collision(Cylinder(r, wall / 2), (0.0, 0.0, wall / 2)),
         collision(m.lathe([(r * 0.97, wall), (screw, shoulder)], 10)),
         collision(Cylinder(screw, (h - shoulder) / 2), (0.0, 0.0, (h + shoulder) / 2)),
         visual(m.lathe(body, 16), srgb(glass), roughness=0.15),
-        visual(
-            m.lathe([(r + 0.0004, middle - 0.15 * h), (r + 0.0004, middle + 0.15 * h)], 16, False),
-            colour(label),
-        ),
+        visual(m.lathe(wrap, 16, False), colour(label)),
         visual(around(m.ellipse(0.0145, 0.021, 10), r + 0.0011, middle), emblem),
         visual(m.lathe(lid, 12), colour(cap), roughness=0.4),
     ]
@@ -273,17 +270,14 @@ def _glue_stick(base: str, cap: str, r: float) -> list[Shape]:
 
 def _glue_bottle(base: str, tip: str, rx: float, ry: float) -> list[Shape]:
     h, wall, shoulder = 0.193, 0.126, 0.144
-    levels = (
-        (rx, ry, 0.0), (rx, ry, wall), (0.7 * rx, 0.75 * ry, shoulder - 0.004),
-        (0.013, 0.013, shoulder),
-    )  # fmt: skip
+    levels = [(rx, ry, 0.0), (rx, ry, wall), (0.7 * rx, 0.75 * ry, shoulder - 0.004)]
+    levels += [(0.013, 0.013, shoulder)]
     nozzle = [(0.0140, shoulder - 0.001), (0.0140, shoulder + 0.010), (0.0085, shoulder + 0.016)]
     nozzle += [(0.0035, h)]
     label = m.rounded_rectangle(0.62 * rx, 0.036, 0.006)
     sides = [m.upright(label, (0.0, s * (ry + 0.0006), 0.066), s * math.pi / 2) for s in (-1, 1)]
-    signs = [
-        m.upright(_drop(0.021), (0.0, s * (ry + 0.0011), 0.066), s * math.pi / 2) for s in (-1, 1)
-    ]
+    drop = _drop(0.021)
+    signs = [m.upright(drop, (0.0, s * (ry + 0.0011), 0.066), s * math.pi / 2) for s in (-1, 1)]
     panel = colour("blue") if base == "white" else build.PAPER
     return [
         collision(m.pillow(levels[:3], 12, 0.7)),

@@ -275,13 +275,10 @@ def toycar(look: int, params: Params) -> ObjectModel:
     ]
     leans = [(s * 0.0138, axis_rotation((0.0, 1.0, 0.0), -s * 0.19)) for s in (-1, 1)]
     posts = [m.box_mesh((0.0013, 0.0022, 0.0056), (x, 0.0085, 0.0272), turn) for x, turn in leans]
-    lamps = [
-        m.upright(m.ellipse(0.0030, 0.0022, 8), (s * 0.0115, -0.0369, 0.0120)) for s in (-1, 1)
-    ]
-    tails = [
-        m.upright(m.rectangle(0.0028, 0.0017), (s * 0.0120, 0.0369, 0.0150), math.pi / 2)
-        for s in (-1, 1)
-    ]
+    lamp = m.ellipse(0.0030, 0.0022, 8)
+    lamps = [m.upright(lamp, (s * 0.0115, -0.0369, 0.0120)) for s in (-1, 1)]
+    tail = m.rectangle(0.0028, 0.0017)
+    tails = [m.upright(tail, (s * 0.0120, 0.0369, 0.0150), math.pi / 2) for s in (-1, 1)]
     bumper = [m.box_mesh((0.0160, 0.0011, 0.0018), (0.0, s * 0.0366, 0.0085)) for s in (-1, 1)]
     wheels = [(s * 0.0150, y) for s in (-1, 1) for y in (-0.0225, 0.0225)]
     tyre = m.lathe([(0.0084, -0.0035), (0.0088, -0.002), (0.0088, 0.002), (0.0084, 0.0035)], 12)

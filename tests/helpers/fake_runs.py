@@ -137,12 +137,6 @@ def run_of(records: Iterable[TrialRecord], name: str = "run", **manifest: Any) -
     return Run(Path(name), read(RunManifest, manifest, name), tuple(found), found)
 
 
-def manifest_data(keys: Sequence[TrialKey], **changes: Any) -> dict[str, Any]:
-    """What the run.json of a run of `keys` holds, with some of its entries given."""
-    listed = {"trials": to_builtins(trial_groups(keys)), "categories": CATEGORIES}
-    return {**listed, "suite": SUITE, "about": {}, **changes}
-
-
 def write(
     folder: Path,
     records: Sequence[TrialRecord],
@@ -153,7 +147,9 @@ def write(
     (folder / "trials").mkdir(parents=True)
     (folder / "trials" / "0000.jsonl").write_text("".join(to_line(r) for r in records))
     keys = [*dict.fromkeys(r.key for r in records), *also_listed]
-    (folder / "run.json").write_text(json.dumps(manifest_data(keys, **changes)))
+    listed = {"trials": to_builtins(trial_groups(keys)), "categories": CATEGORIES}
+    data = {**listed, "suite": SUITE, "about": {}, **changes}
+    (folder / "run.json").write_text(json.dumps(data))
     return load_run(folder)
 
 

@@ -307,19 +307,15 @@ def make_robot(root: Path, robot: str, rounds: int = 0) -> Path:
     arms = embodiment(robot).arms
     both = arms[0].joints[0].name != arms[1].joints[0].name
     folder = root / "embodiments" / robot / "urdf"
-    text = ['<robot name="made_up"><link name="root">', _visual(folder, "root", [_plate()])]
+    mesh = m.box_mesh((0.1, 0.1, 0.005))
+    plate = Piece(np.array(mesh.vertices), np.array(mesh.faces), (40, 40, 200))  # stands still
+    text = ['<robot name="made_up"><link name="root">', _visual(folder, "root", [plate])]
     text.append("</link>")
     for k, arm in enumerate(arms if both else arms[:1]):
         text += _links(folder, arm, f"arm{k}_", rounds)
     folder.joinpath("robot.urdf").write_text("\n".join([*text, "</robot>"]))
     folder.joinpath("other.urdf").write_text('<robot name="other"><link name="a"/></robot>')
     return root
-
-
-def _plate() -> Piece:
-    """Something that stands still."""
-    plate = m.box_mesh((0.1, 0.1, 0.005))
-    return Piece(np.array(plate.vertices), np.array(plate.faces), (40, 40, 200))
 
 
 def _links(folder: Path, arm: Arm, prefix: str, rounds: int) -> list[str]:

@@ -17,9 +17,11 @@ Change = Callable[[Array, Array], Array]
 """(chunk, state at the query) -> chunk."""
 
 FRAMES, CHUNK = 90, 20
+OFFSETS = {"head": 10, "left_wrist": 20, "right_wrist": 60}
+"""How much redder the frames of each camera are."""
 SPEC = PolicySpec(
     "fake",
-    cameras=tuple(CameraSpec(n, 32, 24) for n in ("head", "left_wrist", "right_wrist")),
+    cameras=tuple(CameraSpec(name, 32, 24) for name in OFFSETS),
     horizon=CHUNK,
     action_dim=14,
 )
@@ -29,7 +31,7 @@ EE = PolicySpec("fake", cameras=SPEC.cameras, action="ee", horizon=CHUNK)
 def picture(t: int, camera: str) -> NDArray[np.uint8]:
     """A frame from which t can be read, if one knows channels, side and the way up."""
     image = np.zeros((24, 32, 3), np.uint8)
-    image[..., 0] = 2 * t + {"head": 10, "left_wrist": 20, "right_wrist": 60}[camera]
+    image[..., 0] = 2 * t + OFFSETS[camera]
     image[:12, :, 2] = 250
     return image
 
@@ -48,8 +50,7 @@ def episode(measured: bool = True) -> Episode:
             place = (0.3 * arm - 0.2 + 0.003 * k, 0.1 * np.sin(k / 15), 0.9 + 0.002 * k)
             ee[k, arm] = [*place, *turn, commanded[k, 6 + 7 * arm]]
     late = np.vstack([commanded[:1].repeat(3, 0), commanded[:-3]])
-    names = ("head", "left_wrist", "right_wrist")
-    frames = {n: [picture(k, n) for k in range(FRAMES)] for n in names}
+    frames = {n: [picture(k, n) for k in range(FRAMES)] for n in OFFSETS}
     about = {"task": "Pick_Blocks_Size", "level": 1, "seed": 7}
     return Episode(
         "made-up.hdf5",
@@ -103,9 +104,6 @@ class Learned:
         read = [(float(images[n][..., 0].mean()) - o) / 2 for n, o in OFFSETS.items()]
         t = round(sum(read) / 3)
         return None if max(read) - min(read) > 1.6 or not 0 <= t < FRAMES - 1 else t
-
-
-OFFSETS = {"head": 10, "left_wrist": 20, "right_wrist": 60}
 
 
 def columns(order: list[int]) -> Change:
