@@ -82,7 +82,7 @@ def test_hostile_files_are_refused_in_a_sentence(
     assert "mobility.urdf" in str(refused.value) or "leads out" in str(refused.value)
 
 
-# ------------------------------------------------------ the JSON of a model: its scale and its points
+# ------------------------------------- the JSON of a model: its scale and its points
 
 
 FRAME = [[1, 0, 0, 2], [0, 1, 0, 4], [0, 0, 1, 6], [0, 0, 0, 1]]
