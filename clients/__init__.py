@@ -18,7 +18,6 @@ from robospa.clients.dialect import (
     REFUSED,
     TLS_PORT,
     ConnectionParams,
-    Dialect,
     Endpoint,
     dialects,
     explain_error,
@@ -51,8 +50,11 @@ def find_endpoint(url: str, options: Mapping[str, object] | None = None) -> Endp
         raise ValueError(f"{shown!r}: {REFUSED[parts.scheme]}")
     if dialect is None:
         hint = f"; did you mean ws://{shown}?" if ":" in url and "://" not in url else ""
-        known = _addresses(by_scheme)
-        raise ValueError(f"{shown!r} is no address of a policy server; {known}{hint}")
+        known = ", ".join(f"{scheme}://" for scheme in by_scheme) or "none (is robospa installed?)"
+        raise ValueError(
+            f"{shown!r} is no address of a policy server; they begin with {known} (ws:// for one "
+            f"of robospa serve){hint}"
+        )
     if not parts.hostname:
         raise ValueError(
             f"{shown!r} names no host: write for example {parts.scheme}://localhost:{dialect.port}"
@@ -68,21 +70,11 @@ def find_endpoint(url: str, options: Mapping[str, object] | None = None) -> Endp
     return Endpoint(url, dialect, parts.scheme, parts.hostname, port, parts.path, given)
 
 
-def _addresses(by_scheme: Mapping[str, Dialect]) -> str:
-    """What addresses begin with, in words."""
-    if not by_scheme:
-        return "no dialect is known (is robospa installed?)"
-    known = ", ".join(f"{scheme}://" for scheme in by_scheme)
-    return f"they begin with {known} (ws:// for one of robospa serve)"
+def check_options(url: str, options: Mapping[str, object] | None = None) -> tuple[Endpoint, Any]:
+    """The server that `url` names, and the options of its dialect; talks to nobody.
 
-
-def check_options(url: str, options: Mapping[str, object] | None = None) -> None:
-    """Raises ValueError if `url` or an option cannot be; talks to nobody."""
-    _prepare(url, options)
-
-
-def _prepare(url: str, options: Mapping[str, object] | None) -> tuple[Endpoint, Any]:
-    """The server, and the options of its dialect."""
+    Raises ValueError if `url` or an option cannot be.
+    """
     endpoint = find_endpoint(url, options)
     try:
         return endpoint, read_options(endpoint.dialect.options, endpoint.options)
@@ -119,7 +111,7 @@ def connect(
         WireError: No server answers there, or not as its dialect requires; all such errors are in
             `robospa.protocol.errors`.
     """
-    endpoint, chosen = _prepare(url, options)
+    endpoint, chosen = check_options(url, options)
     params = ConnectionParams(endpoint, timeouts or Timeouts(), token=token, ssl=ssl)
     known = identity is not None
     # A silent server is first given a short time: if it then looks like one of another dialect,

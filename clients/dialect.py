@@ -243,24 +243,22 @@ def explain_error(error: WireError, params: ConnectionParams) -> WireError:
     """`error`, or a HandshakeError that also says which dialect the server seems to speak."""
     endpoint = params.endpoint
     found = detect(params)
-    if found is None or _fits(endpoint.dialect, found):
+    if found is None:
         return error
-    advice = ""
-    if isinstance(found, Dialect):
+    spoken, advice = endpoint.dialect, ""
+    if isinstance(found, str):
+        fits = found == WEBSOCKET and spoken.wire == "websocket"
+    else:
+        fits = found.scheme in (spoken.scheme, *spoken.also_reaches)
         scheme = found.secure_scheme if endpoint.secure and found.secure_scheme else found.scheme
         why = f", because {found.sign}" if found.sign else ""
         advice = f"; try {scheme}://{endpoint.authority}{why}"
+    if fits:
+        return error
     server = found if isinstance(found, str) else found.server
     explanation = HandshakeError(f"{endpoint.url} looks like {server}{advice} ({error})")
     explanation.__cause__ = error
     return explanation
-
-
-def _fits(spoken: Dialect, found: Dialect | str) -> bool:
-    """Whether the dialect that was spoken is right for the server that was found."""
-    if isinstance(found, str):
-        return found == WEBSOCKET and spoken.wire == "websocket"
-    return found.scheme in (spoken.scheme, *spoken.also_reaches)
 
 
 def detect(params: ConnectionParams) -> Dialect | str | None:

@@ -1,16 +1,13 @@
 """GO-1 (AgiBot World): its own `deploy.py` (POST /act, JSON with arrays inside), or its class here.
 
-docs/policies/go1.md has what is sent (`Go1Conventions.inputs`). The answer is a bare list (T, 14)
-of absolute joint targets. There is no reset, no spec and no reason in its errors: every failure
-inside the server is a bare HTTP 500.
-
-`robospa serve go1` runs the official inference class in this process instead: the policy seed of a
-trial decides the noise, and nothing is coded as JSON. It takes one observation at a time.
+The answer is a bare list (T, 14) of absolute joint targets. There is no reset, no spec and no
+reason in its errors: every failure inside the server is a bare HTTP 500. `robospa serve go1` runs
+the official class instead, one observation at a time: the policy seed of a trial decides the noise.
 
     PYTHONPATH=AgiBot-World robospa serve go1 --option checkpoint=... --option stats=...
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +16,7 @@ import numpy as np
 
 from robospa.clients import model_policy
 from robospa.clients.chunks import ChunkOptions, Frequency
-from robospa.clients.dialect import ConnectionParams, Dialect, Probe
+from robospa.clients.dialect import Answer, ConnectionParams, Dialect, Probe
 from robospa.clients.http import HttpSession, chunk_of, dumps
 from robospa.observation import Observation
 from robospa.protocol.options import option
@@ -86,9 +83,7 @@ class Go1Session(HttpSession):
         warnings = (*WARNINGS, SWAPPED) if options.wrists == "swapped" else WARNINGS
         super().__init__(params, "go1", spec, options, warnings, ("HTTP 500", SILENT))
 
-    def infer(
-        self, id: int, observation: Observation, timeout: float
-    ) -> tuple[object, Mapping[str, float]]:
+    def infer(self, id: int, observation: Observation, timeout: float) -> Answer:
         body = dumps(self._options.inputs(observation)).encode()
         return chunk_of(self.ask(body, timeout)), {}
 
@@ -109,10 +104,7 @@ DIALECT = Dialect(
     recognise=recognise,
     sign="it answers an empty question with a bare HTTP 500",
     weak_sign=True,
-    deciding_options={
-        "wrist images swapped": "wrists",
-        "measured state": "state",
-    },
+    deciding_options={"wrist images swapped": "wrists", "measured state": "state"},
 )
 
 
@@ -120,14 +112,9 @@ DIALECT = Dialect(
 class Go1ServerOptions(Go1Conventions):
     """How GO-1 is loaded; the conventions are those of the client `go1+http`."""
 
-    checkpoint: str = option("", "folder of the fine-tuned model")
+    checkpoint: str = option("", "folder of the fine-tuned model", needed=True)
     stats: str | None = option(None, "dataset_stats.json of its training run, if it normalises")
     code: str | None = option(None, "checkout of AgiBot-World, or set PYTHONPATH")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not self.checkpoint:
-            raise ValueError("option checkpoint is needed: the folder of the fine-tuned model")
 
 
 class Go1(model_policy.ModelPolicy):

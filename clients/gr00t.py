@@ -19,7 +19,6 @@ msgpack-numpy's, which newer versions answer. The server stops at `kill`, which 
 import contextlib
 import json
 import socket
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -96,21 +95,19 @@ class ZeroMq:
         return value
 
     def _receive(self, endpoint: str, timeout: float) -> bytes:
-        until = time.monotonic() + timeout
-        while True:
-            ready = dict(self._poller.poll(max(int((until - time.monotonic()) * 1e3), 0)))
-            if self._socket in ready:
-                return self._socket.recv()
-            self.close()
-            if ready:
-                raise errors.ConnectionLost(
-                    f"the connection to {self.url} ended while waiting: the server went away, or "
-                    f"answered more than {self._limits.message} bytes"
-                )
-            raise errors.CallTimeout(
-                f"{self.url} did not answer {endpoint} within {timeout:g} s; look at the server's "
-                "log, or allow more time (it answers one request at a time, whoever asks)"
+        ready = dict(self._poller.poll(int(timeout * 1e3)))
+        if self._socket in ready:
+            return self._socket.recv()
+        self.close()
+        if ready:
+            raise errors.ConnectionLost(
+                f"the connection to {self.url} ended while waiting: the server went away, or "
+                f"answered more than {self._limits.message} bytes"
             )
+        raise errors.CallTimeout(
+            f"{self.url} did not answer {endpoint} within {timeout:g} s; look at the server's "
+            "log, or allow more time (it answers one request at a time, whoever asks)"
+        )
 
     def close(self) -> None:
         self._context.destroy(linger=0)
@@ -329,7 +326,7 @@ class Gr00tSession(StatelessSession):
         states = np.stack([self._robot(view["state"]) for view in views])
         found: dict[str, dict[str, NDArray[np.generic]]] = {
             "video": {
-                key: _stacked([view["images"][ours[key]] for view in frames])[batch]
+                key: np.stack([view["images"][ours[key]] for view in frames])[batch]
                 for key in self._video.keys
             },
             "state": {key: states[:, self._columns(key)][batch] for key in self._state.keys},
@@ -383,11 +380,6 @@ class Gr00tSession(StatelessSession):
 
     def close(self) -> None:
         self._server.close()
-
-
-def _stacked(frames: list[NDArray[np.uint8]]) -> NDArray[np.uint8]:
-    """Pictures (H, W, 3) as (T, H, W, 3); a single one is not copied."""
-    return frames[0][None] if len(frames) == 1 else np.stack(frames)
 
 
 def recognise(probe: Probe) -> bool:

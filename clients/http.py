@@ -36,12 +36,7 @@ WRONG_ADDRESS = {
     "HTTP 426": "is a WebSocket, not an HTTP endpoint",
 }
 """What the status of a first request says about the address."""
-UNAVAILABLE = (
-    http.HTTPStatus.TOO_MANY_REQUESTS,
-    http.HTTPStatus.BAD_GATEWAY,
-    http.HTTPStatus.SERVICE_UNAVAILABLE,
-    http.HTTPStatus.GATEWAY_TIMEOUT,
-)
+UNAVAILABLE = (429, 502, 503, 504)
 """The server is not there, or has no room: what stands before it answers in its place."""
 TEXT = "an error"
 """Code of an answer that is a bare text."""

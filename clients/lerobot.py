@@ -13,6 +13,7 @@ import hashlib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -30,22 +31,13 @@ OBJECTS = "observation.environment_state"
 STATE_STEP = "Pi05PrepareStateTokenizerProcessorStep"
 
 
-class StateWidth:
-    """A processor step that pads or cuts the state before pi0.5 prints it into its prompt."""
-
-    def __init__(self, width: int) -> None:
-        self.width = width
-
-    def __call__(self, transition: Any) -> Any:
-        """The transition with a state of `width` numbers, zeros appended."""
-        torch = model_policy.import_torch()
-        changed = dict(transition)
-        observation = dict(changed["observation"])
-        state = observation[STATE]
-        lacking = self.width - state.shape[-1]
-        observation[STATE] = torch.nn.functional.pad(state, (0, lacking)) if lacking > 0 else state
-        changed["observation"] = observation
-        return changed
+def padded(width: int, transition: Any) -> Any:
+    """The transition with a state of at least `width` numbers, zeros appended."""
+    torch = model_policy.import_torch()
+    state = transition["observation"][STATE]
+    if (lacking := width - state.shape[-1]) > 0:
+        state = torch.nn.functional.pad(state, (0, lacking))
+    return {**transition, "observation": {**transition["observation"], STATE: state}}
 
 
 def print_state(before: Any, width: int) -> None:
@@ -55,7 +47,7 @@ def print_state(before: Any, width: int) -> None:
     if not places:
         raise ValueError("option state_prompt is for pi0.5: these processors print no state")
     steps[places[0]].max_state_dim = width  # LeRobot < 0.5 pads to this itself
-    steps.insert(places[0], StateWidth(width))
+    steps.insert(places[0], partial(padded, width))
     before.steps = steps
 
 
@@ -128,7 +120,9 @@ def _camera_named(key: str) -> str:
 class LeRobotServerOptions(RobotOption):
     """How a LeRobot policy is loaded and fed."""
 
-    path: str = option("", "folder of the checkpoint (`pretrained_model`), or a hub name")
+    path: str = option(
+        "", "folder of the checkpoint (`pretrained_model`), or a hub name", needed=True
+    )
     device: str = option("cuda", "device of the model")
     batch: Count = option(8, "observations in one call of the model, at most")
     images: str | None = option(
@@ -173,8 +167,6 @@ class LeRobotServerOptions(RobotOption):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.path:
-            raise ValueError("option path is needed: the checkpoint's folder or hub name")
         if self.state_prompt not in (None, 14, 32):
             raise ValueError(f"option state_prompt={self.state_prompt} is none of 14, 32")
         if self.space is not None and self.space not in SPACES:

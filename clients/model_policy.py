@@ -103,22 +103,16 @@ def import_code(module: str, code: str | None, whose: str) -> Any:
             raise ModelMissing(f"there is no folder {folder}: option code must be {whose}")
         if str(folder) not in sys.path:
             sys.path.insert(0, str(folder))
-    try:
-        return importlib.import_module(module)
-    except ImportError as error:
-        raise ModelMissing(
-            f"cannot import {module} ({error}): run this in the environment of the model, with "
-            f"{whose} on PYTHONPATH or as option code"
-        ) from error
+    return import_installed(module, f", with {whose} on PYTHONPATH or as option code")
 
 
-def import_installed(module: str) -> Any:
+def import_installed(module: str, where: str = "") -> Any:
     """A `module` that the model's environment has installed; raises ModelMissing."""
     try:
         return importlib.import_module(module)
     except ImportError as error:
         raise ModelMissing(
-            f"cannot import {module} ({error}): run this in the environment of the model"
+            f"cannot import {module} ({error}): run this in the environment of the model{where}"
         ) from error
 
 
@@ -221,14 +215,8 @@ def seeded_rows(seeds: Sequence[int]) -> Iterator[None]:
     like = {torch.randn_like: torch.randn, torch.rand_like: torch.rand}
     fresh = {torch.randn, torch.rand}
     inplace = {torch.Tensor.normal_, torch.Tensor.uniform_}
-    others = {
-        torch.randint,
-        torch.randperm,
-        torch.bernoulli,
-        torch.multinomial,
-        torch.Tensor.bernoulli_,
-        torch.Tensor.exponential_,
-    }
+    others = {torch.randint, torch.randperm, torch.bernoulli, torch.multinomial}
+    others |= {torch.normal, torch.Tensor.bernoulli_, torch.Tensor.exponential_}
 
     def rows(draw: Callable[..., Any], shape: Sequence[int], dtype: Any, device: Any) -> Any:
         if not shape or shape[0] != len(generators):
@@ -244,12 +232,10 @@ def seeded_rows(seeds: Sequence[int]) -> Iterator[None]:
             args: tuple[Any, ...] = (),
             kwargs: dict[str, Any] | None = None,
         ) -> Any:
-            kwargs = dict(kwargs or {})
+            kwargs, drawn = kwargs or {}, None
             if kwargs.get("generator") is None:
                 drawn = self.drawn(function, args, kwargs)
-                if drawn is not None:
-                    return drawn
-            return function(*args, **kwargs)
+            return function(*args, **kwargs) if drawn is None else drawn
 
         def drawn(self, function: Any, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
             """The numbers by row; None where the call is none of ours."""
@@ -273,7 +259,7 @@ def seeded_rows(seeds: Sequence[int]) -> Iterator[None]:
                 if unit is not None:
                     scaled = unit * high + low if normal else unit * (high - low) + low
                     result = target.copy_(scaled)
-            elif function not in others and function is not torch.normal:
+            elif function not in others:
                 return None
             if result is None and len(generators) > 1:
                 raise NotByRow(f"{function.__name__} was not drawn row by row")

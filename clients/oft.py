@@ -1,12 +1,5 @@
 """OpenVLA-OFT behind its own `deploy.py`: POST /act, JSON with arrays as json_numpy writes them.
 
-    ours                           the body
-    images.head                    full_image           (240, 320, 3) uint8 RGB
-    images.left_wrist              left_wrist_image     first: the server takes every name with
-    images.right_wrist             right_wrist_image    "wrist" in the order of the JSON object
-    state (14,)                    state                float64
-    instruction                    instruction
-
 Answered is a list of T actions, each an array of 14 joint targets. Images of any size are brought
 to 224x224 by the server, as in its training. It says nothing of itself, has no reset, and answers
 every failure with HTTP 200 and the text "error".
@@ -70,7 +63,7 @@ class OftSession(HttpSession):
 
 
 def body(observation: Observation) -> dict[str, object]:
-    """One query, arrays as they are; the order of the names decides which wrist is which."""
+    """One query, arrays as they are; the server takes every name with "wrist" in their order."""
     images = observation["images"]
     return {
         "full_image": images["head"],

@@ -1,20 +1,13 @@
 """openpi's models behind our own server, and their training on our datasets.
 
-The client to openpi's own server is `robospa.clients.openpi_family`; our server answers clients of
-openpi too: `robospa.protocol.openpi`.
-
 `robospa serve openpi` runs openpi's policy in this process, with noise from our seeds. A
 configuration whose `adapt_to_pi` is on is refused: it turns joints and grippers of another robot
-into ours silently, which is invisible on the wire.
-
-    robospa serve openpi --option config=pi05_robotwin --option checkpoint=...
+into ours silently, which is invisible on the wire. (The client to openpi's own server is
+`robospa.clients.openpi_family`.)
 
 A dataset `robospa/NAME` is trained on as `pi05_robospa_NAME`, all parameters, or
 `pi05_lora_robospa_NAME` (`docs/policies/pi05.md`). Neither name is in openpi's own list, so its
 scripts are started from here, in openpi's environment and folder.
-
-The names are those that the client sends at evaluation. openpi's own Aloha configurations name no
-prompt among what they take from a dataset; without it, `prompt_from_task` has no effect.
 """
 
 import re
@@ -45,7 +38,9 @@ REPACKED = {
     "actions": "action",
     "prompt": "prompt",
 }
-"""What openpi is to take from a frame of our dataset, under its own names."""
+"""What openpi is to take from a frame of our dataset, under the names that the client sends at
+evaluation. Without the prompt, which openpi's Aloha configurations lack, `prompt_from_task` has no
+effect."""
 WEIGHTS = "gs://openpi-assets/checkpoints/pi05_base/params"
 STEPS = 20_000
 BATCH = 16
@@ -70,10 +65,8 @@ def train_config(name: str, code: str | None = None) -> Any:
     kind: dict[str, bool | str] = {"pi05": True}
     extra: dict[str, Any] = {}
     if match["lora"]:
-        kind |= {
-            "paligemma_variant": "gemma_2b_lora",
-            "action_expert_variant": "gemma_300m_lora",
-        }
+        kind["paligemma_variant"] = "gemma_2b_lora"
+        kind["action_expert_variant"] = "gemma_300m_lora"
         extra = {"freeze_filter": models.Pi0Config(**kind).get_freeze_filter(), "ema_decay": None}
     return configs.TrainConfig(
         name=name,
@@ -103,9 +96,11 @@ class OpenPiServerOptions(RobotOption):
     """How the policy is loaded."""
 
     config: str = option(
-        "", "name of the training configuration in openpi, or pi05_robospa_NAME of our datasets"
+        "",
+        "name of the training configuration in openpi, or pi05_robospa_NAME of our datasets",
+        needed=True,
     )
-    checkpoint: str = option("", "its folder (or gs:// address)")
+    checkpoint: str = option("", "its folder (or gs:// address)", needed=True)
     code: str | None = option(None, "folder with openpi's sources, if it is not installed")
     adapt_to_pi: str = option(
         "refuse",
@@ -114,11 +109,6 @@ class OpenPiServerOptions(RobotOption):
     )
     batch: Count = option(8, "observations in one call, where the class has infer_batch")
     execute: Count | None = option(None, "actions executed before the next query; none for all")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not self.config or not self.checkpoint:
-            raise ValueError("options config and checkpoint are needed")
 
 
 class OpenPi(model_policy.ModelPolicy):

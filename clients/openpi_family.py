@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace
 from robospa.clients.chunks import ChunkOptions, Count, Targets, as_chunk, refuse_unread
-from robospa.clients.dialect import ConnectionParams, Dialect, Probe, StatelessSession
+from robospa.clients.dialect import Answer, ConnectionParams, Dialect, Probe, StatelessSession
 from robospa.clients.numpy_msgpack import unpack
 from robospa.observation import CameraSpec, Observation
 from robospa.protocol import errors
@@ -320,9 +320,7 @@ class FamilySession(StatelessSession):
         if begin := self._options.maps["reset"]:
             self._check(self._ask(begin, self._timeouts.reset, "an answer to a reset"))
 
-    def infer(
-        self, id: int, observation: Observation, timeout: float
-    ) -> tuple[object, Mapping[str, float]]:
+    def infer(self, id: int, observation: Observation, timeout: float) -> Answer:
         request = {**self._preset.fixed, **self._options.request(observation)}
         answer = self._ask(request, timeout, "actions")
         if self._options.actions and not isinstance(answer, Mapping):

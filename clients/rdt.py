@@ -1,18 +1,17 @@
 """RDT-1B: the official class, unmodified, behind our wire (it has no server of its own).
 
-Imports `scripts.agilex_model` from a checkout of RoboticsDiffusionTransformer. What is done here is
-what its callers do for RoboTwin: six images (head, right wrist, left wrist, one action ago and now;
-at the first step there is no past), each brought to 640x480 and through JPEG; the instruction as
-T5 hidden states, made once and cached; and the real robot's gripper factors, which the class
-applies in both directions, cancelled, because our grippers are 0..1.
+Done here is what its callers do for RoboTwin: six images (head, right wrist, left wrist, one action
+ago and now; at the first step there is no past), each brought to 640x480 and through JPEG; the
+instruction as T5 hidden states; and the real robot's gripper factors, which the class applies in
+both directions, cancelled, because our grippers are 0..1.
 
     PYTHONPATH=RoboticsDiffusionTransformer robospa serve rdt --option checkpoint=...
 """
 
 import hashlib
-from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -42,45 +41,33 @@ class Embeddings:
     ) -> None:
         self._folder, self._t5, self._device, self._dtype = folder, t5, device, dtype
         self._max_tokens = max_tokens
-        self._encoder: tuple[Any, Any] | None = None
-        self._cache: OrderedDict[str, Any] = OrderedDict()
         self._files: dict[str, Path] = {}
-        if folder is not None:
-            if t5 is None and not folder.is_dir():
-                raise model_policy.ModelMissing(
-                    f"there is no folder {folder}, and option t5 is none"
-                )
-            folder.mkdir(parents=True, exist_ok=True)
-            for path in sorted(folder.glob("*.pt")):
-                found = self._read(path)
-                if "instruction" in found:  # a file without one cannot be identified
-                    self._files[str(found["instruction"])] = path
+        self.find = lru_cache(CACHED)(self._find)
+        if folder is None:
+            return
+        if t5 is None and not folder.is_dir():
+            raise model_policy.ModelMissing(f"there is no folder {folder}, and option t5 is none")
+        folder.mkdir(parents=True, exist_ok=True)
+        for path in sorted(folder.glob("*.pt")):
+            found = self._read(path)
+            if "instruction" in found:  # a file without one cannot be identified
+                self._files[str(found["instruction"])] = path
 
-    def find(self, instruction: str) -> Any:
+    def _find(self, instruction: str) -> Any:
         """The embedding of `instruction`; raises ModelMissing where nothing can make it."""
-        if instruction not in self._cache:
-            path = self._files.get(instruction)
-            self._cache[instruction] = (
-                self._read(path)["embeddings"] if path is not None else self._make(instruction)
-            )
-            if len(self._cache) > CACHED:
-                self._cache.popitem(last=False)
-        self._cache.move_to_end(instruction)
-        tensor = self._cache[instruction]
+        path = self._files.get(instruction)
+        tensor = self._make(instruction) if path is None else self._read(path)["embeddings"]
         return tensor[None] if tensor.ndim == 2 else tensor
 
     def _read(self, path: Path) -> Any:
         torch = model_policy.import_torch()
+        wrong = f"{path} is no file of T5 embeddings"
         try:
             found = torch.load(path, map_location="cpu", weights_only=True)
         except Exception as error:  # torch raises many kinds for broken files
-            raise model_policy.ModelMissing(
-                f"{path} is no file of T5 embeddings: {error}"
-            ) from error
+            raise model_policy.ModelMissing(f"{wrong}: {error}") from error
         if not isinstance(found, dict) or getattr(found.get("embeddings"), "ndim", 0) not in (2, 3):
-            raise model_policy.ModelMissing(
-                f"{path} is no file of T5 embeddings: it lacks 'embeddings'"
-            )
+            raise model_policy.ModelMissing(f"{wrong}: it lacks 'embeddings'")
         return found
 
     def _make(self, instruction: str) -> Any:
@@ -90,7 +77,7 @@ class Embeddings:
                 "RDT's scripts/encode_lang.py, or give option t5"
             )
         torch = model_policy.import_torch()
-        tokenizer, encoder = self._load()
+        tokenizer, encoder = self._encoder
         tokens = tokenizer(
             instruction,
             return_tensors="pt",
@@ -107,17 +94,16 @@ class Embeddings:
             self._files[instruction] = path
         return made
 
-    def _load(self) -> tuple[Any, Any]:
+    @cached_property
+    def _encoder(self) -> tuple[Any, Any]:
         """Tokenizer and encoder; the official embedder insists on a folder of a certain name, so
         the encoder is loaded without it."""
-        if self._encoder is None:
-            transformers = model_policy.import_installed("transformers")
-            encoder = transformers.T5EncoderModel.from_pretrained(
-                self._t5, torch_dtype=self._dtype, low_cpu_mem_usage=True
-            )
-            tokenizer = transformers.AutoTokenizer.from_pretrained(self._t5)
-            self._encoder = tokenizer, encoder.to(self._device).eval()
-        return self._encoder
+        transformers = model_policy.import_installed("transformers")
+        encoder = transformers.T5EncoderModel.from_pretrained(
+            self._t5, torch_dtype=self._dtype, low_cpu_mem_usage=True
+        )
+        tokenizer = transformers.AutoTokenizer.from_pretrained(self._t5)
+        return tokenizer, encoder.to(self._device).eval()
 
 
 VIEWS = ("head", "right_wrist", "left_wrist")
@@ -132,7 +118,9 @@ ACTION_FACTORS = (11.8997, 13.9231)
 class RdtServerOptions(ChunkOptions):
     """How RDT is loaded and fed."""
 
-    checkpoint: str = option("", "folder or file (.pt, .safetensors) with the fine-tuned weights")
+    checkpoint: str = option(
+        "", "folder or file (.pt, .safetensors) with the fine-tuned weights", needed=True
+    )
     code: str | None = option(None, "checkout of RoboticsDiffusionTransformer, or set PYTHONPATH")
     config: str | None = option(None, "the model's YAML; none for configs/base.yaml in the code")
     vision: str = option("google/siglip-so400m-patch14-384", "SigLIP: a hub name or a folder")
@@ -155,8 +143,6 @@ class RdtServerOptions(ChunkOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.checkpoint:
-            raise ValueError("option checkpoint is needed: the fine-tuned weights")
         if self.embeddings is None and self.t5 is None:
             raise ValueError("options embeddings and t5 are both none: instructions need one")
 

@@ -9,7 +9,7 @@ number than the observation's ends the connection here, and every trial begins o
 """
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -100,8 +100,7 @@ class VlaEvalSession(StatelessSession):
         name = str(greeting.get("model_server", ""))
         announced = {key: json_values(greeting[key]) for key in ANNOUNCED if key in greeting}
         server = printable(f"{name} {greeting.get('harness_version', '')}", 200)
-        odd = (*_state_not_sent(announced, options), *_other_width(announced, options))
-        warnings = (*WARNINGS, *odd)
+        warnings = (*WARNINGS, *_doubts(announced, options))
         super().__init__("vla-eval", spec, options, warnings, server=server, said=announced)
 
     def reset(self, id: int, trial: TrialInfo) -> None:
@@ -146,10 +145,12 @@ class VlaEvalSession(StatelessSession):
             raise self._socket.violation("its answer is no message of vla-eval")
         if kind == "error":
             text = str(body.get("error", "no reason given"))
-            late = answer.get("seq") != number
-            if late:  # of `episode_start`: this observation's own answer is still to come
+            what = "an error"
+            if (
+                answer.get("seq") != number
+            ):  # of `episode_start`: the observation's is still to come
                 self.close()
-            what = "an error" if not late else "an error of an earlier message"
+                what = "an error of an earlier message"
             raise ServerError(what, text, True, self._socket.url)
         if answer.get("seq") != number:
             raise self._socket.violation(f"answer {answer.get('seq')} came to message {number}")
@@ -163,35 +164,26 @@ STATE_NAMES = ("state", "states")
 ANNOUNCED = ("observation_params", "action_spec", "observation_spec", "capabilities")
 
 
-def _state_not_sent(
-    announced: Mapping[str, object], options: VlaEvalClientOptions
-) -> Sequence[str]:
-    read = announced.get("observation_spec")
-    sent = options.state_keys.split(",")
-    lacking = [name for name in STATE_NAMES if isinstance(read, Mapping) and name in read]
-    return [
-        f"the server announces that it reads {name!r}, which is not sent: give it the joints by "
-        f"state_keys={options.state_keys},{name} if it was trained with them"
-        for name in lacking
-        if name not in sent
-    ]
-
-
-def _other_width(announced: Mapping[str, object], options: VlaEvalClientOptions) -> Sequence[str]:
-    parts = announced.get("action_spec")
-    if not isinstance(parts, Mapping):
-        return []
-    sizes = {name: part.get("dims") for name, part in parts.items() if isinstance(part, Mapping)}
+def _doubts(announced: Mapping[str, object], options: VlaEvalClientOptions) -> Iterator[str]:
+    """What the server announces of its state and actions and these options do not fit."""
+    read, parts = announced.get("observation_spec"), announced.get("action_spec")
+    reads = [name for name in STATE_NAMES if isinstance(read, Mapping) and name in read]
+    for name in reads:
+        if name not in options.state_keys.split(","):
+            yield (
+                f"the server announces that it reads {name!r}, which is not sent: give it the "
+                f"joints by state_keys={options.state_keys},{name} if it was trained with them"
+            )
+    named = parts if isinstance(parts, Mapping) else {}
+    sizes = {name: part.get("dims") for name, part in named.items() if isinstance(part, Mapping)}
     known = [size for size in sizes.values() if isinstance(size, int)]
-    total = sum(known)
     width = options.columns(options.space)
-    if not all(known) or not known or width is None or total == width:
-        return []
-    listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
-    return [
-        f"the server announces {total} numbers an action ({listed}), but {options.space} actions "
-        f"have {width}"
-    ]
+    if known and all(known) and width not in (None, sum(known)):
+        listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
+        yield (
+            f"the server announces {sum(known)} numbers an action ({listed}), but {options.space} "
+            f"actions have {width}"
+        )
 
 
 def recognise(probe: Probe) -> bool:
@@ -208,7 +200,5 @@ DIALECT = Dialect(
     open_session=VlaEvalSession,
     recognise=recognise,
     sign="its /health answers status ok",
-    deciding_options={
-        "gripper inverted": "grippers",
-    },
+    deciding_options={"gripper inverted": "grippers"},
 )

@@ -1,25 +1,13 @@
 """XPolicyLab's policy server: one WebSocket protocol in front of some forty policies.
 
-    ours                       payload.observation (msgpack, arrays as msgpack-numpy writes them)
-    images.head                vision.cam_head.color           (240, 320, 3) uint8 RGB
-    images.left_wrist          vision.cam_left_wrist.color
-    images.right_wrist         vision.cam_right_wrist.color
-    state (14,)                state.left_arm_joint_state (6,), left_ee_joint_state (1,), right..
-    ee (2, 8)                  state.left_ee_pose (7,) x y z qw qx qy qz, left_tcp_pose, right..
-    instruction                instruction, instructions
-
 Answered is a list of maps, one an action; a single map; rows of numbers (T, D); or one row. A map
-has these names, or others in `NAMES`, the first of which wins:
+has the names of `NAMES`; those of the space that was not asked for are ignored, as by RoboTwin's
+client of it; any other name is refused, because what it holds would be lost. An arm or a gripper
+that an action does not name stays as it was commanded last.
 
-    joint      left_arm_joint_state (6,), left_ee_joint_state (1,), and the same for the right arm
-    ee         left_ee_pose (7,) x y z qw qx qy qz, left_ee_joint_state (1,), and for the right arm
-
-Names of the space that was not asked for are ignored, as by RoboTwin's client of it; any other name
-is refused, because what it holds would be lost. An arm or a gripper that an action does not name
-stays as it was commanded last. Every message has
-an id, which its answer must repeat, and which no other message ever had: since August 2026 the
-server answers a known id as before, without asking the model. Failures and unknown types are
-answered, a message that cannot be decoded is not: then the deadline is the only news.
+Every message has an id, which its answer must repeat, and which no other message ever had: since
+August 2026 the server answers a known id as before, without asking the model. Failures and unknown
+types are answered, a message that cannot be decoded is not: then the deadline is the only news.
 """
 
 import contextlib
@@ -46,20 +34,17 @@ from robospa.registry import did_you_mean
 
 BODIES = {"joint": "arm_joint_state", "ee": "ee_pose"}
 """What moves an arm in each space, under its usual name without the arm."""
+LEFT_ARM = ("left_arm_joint", "left_joint_state", "arm_joint_state", "joint_state")
 NAMES = {
-    "left_arm_joint_state": (
-        "left_arm_joint",
-        "left_joint_state",
-        "arm_joint_state",
-        "joint_state",
-    ),
+    "left_arm_joint_state": LEFT_ARM,
     "right_arm_joint_state": ("right_arm_joint", "right_joint_state"),
     "left_ee_pose": ("left_endpose", "ee_pose"),
     "right_ee_pose": ("right_endpose",),
     "left_ee_joint_state": ("left_gripper", "left_gripper_pos", "ee_joint_state"),
     "right_ee_joint_state": ("right_gripper", "right_gripper_pos"),
 }
-"""Other names of each part of an action, in the order in which they are looked for."""
+"""Other names of each part of an action, in the order in which they are looked for; joints (6,),
+poses (7,) x y z qw qx qy qz, grippers (1,)."""
 SPACES = {"joint": "joint", "qpos": "joint", "ee": "ee", "endpose": "ee"}
 """The space that an `action_type` names."""
 PART_NAMES = {"action_type", *NAMES, *(other for others in NAMES.values() for other in others)}
@@ -335,8 +320,5 @@ DIALECT = Dialect(
     recognise=recognise,
     sign="it answers XPolicyLab's hello",
     shared_state=True,
-    deciding_options={
-        "measured state": "state",
-        "gripper inverted": "grippers",
-    },
+    deciding_options={"measured state": "state", "gripper inverted": "grippers"},
 )

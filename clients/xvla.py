@@ -1,13 +1,10 @@
 """X-VLA behind its own `deploy.py`: POST /act, JSON whose arrays are JSON texts themselves.
 
-`docs/policies/xvla.md` lists what is sent. Answered are T x 20 absolute end-effector poses,
-executed as our `ee` actions; with `space=joint` T x 14 joint targets for a joint-space fine-tune.
-From the second query of a trial on, the state sent is not measured but the command executed last,
-as in X-VLA's own evaluation.
-Errors inside the server are a bare HTTP 400 without a reason.
-
-`robospa serve xvla` runs the official class in this process instead: several trials in one call,
-and noise from our seeds, which X-VLA's own server draws from none.
+Answered are T x 20 absolute end-effector poses, executed as our `ee` actions; with `space=joint`
+T x 14 joint targets. From the second query of a trial on, the state sent is not measured but the
+command executed last, as in X-VLA's own evaluation. Errors are a bare HTTP 400 without a reason.
+`robospa serve xvla` runs the official class instead: several trials in one call, and noise from our
+seeds, which X-VLA's own server draws from none.
 
     PYTHONPATH=X-VLA robospa serve xvla --option checkpoint=2toINF/X-VLA-RoboTwin2
 """
@@ -226,15 +223,10 @@ CHECKOUT = "a checkout of X-VLA"
 class XvlaServerOptions(XvlaConventions):
     """How X-VLA is loaded; the conventions are those of the client `xvla+http`."""
 
-    checkpoint: str = option("", "folder or hub name of the model and its processor")
+    checkpoint: str = option("", "folder or hub name of the model and its processor", needed=True)
     code: str | None = option(None, "checkout of X-VLA, or set PYTHONPATH")
     device: str = option("cuda", "device of the model")
     batch: Count = option(8, "observations in one call of the model, at most")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not self.checkpoint:
-            raise ValueError("option checkpoint is needed: a folder or a hub name")
 
 
 class Xvla(model_policy.ModelPolicy):

@@ -1,13 +1,9 @@
 """Requests that arrive together become one call of the model, without anything to tune.
 
 While a call runs, requests gather. When it is over, the batcher may still wait for those that are
-about to arrive, if that raises the number of answers per second, at most for as long as one call
-takes (`AdaptiveBatchWindow`). So a lone client never waits, eight clients in step share
-one call, and a client in the middle of a long simulation delays nobody. With a fixed number of
-clients more answers per second are also shorter waits on average: there is one goal, not two.
-
-If a call of several observations fails, each is tried alone: one bad sample must not fail the
-others.
+about to arrive, if that raises the number of answers per second (`AdaptiveBatchWindow`). So a lone
+client never waits, eight clients in step share one call, and a client in the middle of a long
+simulation delays nobody. If a call of several observations fails, each is tried alone.
 """
 
 import asyncio
@@ -92,11 +88,9 @@ class AdaptiveBatchWindow:
         self._free = 0.0
 
     def request_began(self, session: int, now: float) -> None:
-        """The first bytes of a request have arrived."""
         self._sessions.setdefault(session, _Arrivals()).began = now
 
     def arrived(self, session: int, now: float) -> None:
-        """A complete request has arrived."""
         arrivals = self._sessions.setdefault(session, _Arrivals())
         if arrivals.began is not None:
             self._transfer += 0.2 * (now - arrivals.began - self._transfer)
@@ -107,7 +101,6 @@ class AdaptiveBatchWindow:
             arrivals.answered = None
 
     def answered(self, sessions: Sequence[int], start: float, end: float) -> None:
-        """A call for `sessions` is over."""
         self.cost.add(len(sessions), end - start)
         self._free = end
         for session in sessions:
@@ -115,7 +108,6 @@ class AdaptiveBatchWindow:
                 self._sessions[session].answered = end
 
     def forget(self, session: int) -> None:
-        """The session pauses: it is not waited for any more."""
         self._sessions.pop(session, None)
 
     def wait_for(self, now: float, waiting: Collection[int], oldest: float, size: int) -> float:
@@ -190,11 +182,6 @@ class Batcher:
     _arrived: asyncio.Event = field(default_factory=asyncio.Event)
     _task: asyncio.Task[None] | None = None
 
-    @property
-    def waiting(self) -> int:
-        """Requests that no call has taken yet."""
-        return len(self._pending)
-
     async def infer(self, session: int, observation: Observation) -> Answer:
         """The answer to one observation and its timing; raises what the model raised."""
         if len(self._pending) >= self.queue:
@@ -225,18 +212,15 @@ class Batcher:
 
     async def _run(self) -> None:
         while self._pending:
-            await self._gather()
+            if (pause := self.wait_for(self.clock())) > 0:
+                # A request that arrives ends the pause. If the expected one is late, look again.
+                self._arrived.clear()
+                timer = asyncio.get_running_loop().call_later(pause, self._arrived.set)
+                await self._arrived.wait()
+                timer.cancel()
+                continue
             batch, self._pending = self._pending[: self.size], self._pending[self.size :]
-            if batch:
-                await self._answer(batch)
-
-    async def _gather(self) -> None:
-        while self._pending and (pause := self.wait_for(self.clock())) > 0:
-            # A request that arrives ends the pause. If the expected one is late, look again.
-            self._arrived.clear()
-            timer = asyncio.get_running_loop().call_later(pause, self._arrived.set)
-            await self._arrived.wait()
-            timer.cancel()
+            await self._answer(batch)
 
     def wait_for(self, now: float) -> float:
         """Seconds to wait for more requests before looking again; 0 to call the model now."""

@@ -7,13 +7,9 @@ is aligned).
 
 Refused, with EncodeError or DecodeError: object, string, structured and complex dtypes (there is
 no pickle here), extension types, repeated keys, anything beyond `Limits`. All lengths are compared
-with the bytes that are really there before anything is allocated, so that a short message cannot
-claim a large array.
-
-That is why the decoder is written here. The msgpack package copies binary values, and its hooks see
-a list only when it is whole: 64 MiB of nested lists of short texts cost it 1.5 GB and 7 s, and this
-reader, which stops at the limit of items, half a second. A whole round trip takes the same time
-with either.
+with the bytes that are really there before anything is allocated. That is why the decoder is
+written here: the msgpack package copies binary values, and its hooks see a list only when it is
+whole, so that 64 MiB of nested lists of short texts cost it 1.5 GB and 7 s, this reader 0.5 s.
 """
 
 from __future__ import annotations
@@ -269,7 +265,8 @@ class Reader:
             if key not in _BINARY_KEYS or key in found:
                 raise self.fail(f"unknown or repeated binary key {key!r}")
             self.items += 2
-            if key == _DATA and _SCALAR not in found and self._next_is_binary():
+            binary = self.pos < self.end and self.bytes[self.pos] in _BIN
+            if key == _DATA and _SCALAR not in found and binary:
                 found[key] = self.binary()
             else:
                 found[key] = self.value(self.limits.depth - 1)
@@ -278,9 +275,6 @@ class Reader:
         if found.keys() == _SCALAR_KEYS and type(found[_DATA]) in (bool, int, float):
             return found[_DATA]
         raise self.fail("a map with binary keys is neither an array nor a scalar")
-
-    def _next_is_binary(self) -> bool:
-        return self.pos < self.end and self.bytes[self.pos] in _BIN
 
     def array(self, data: object, name: object, shape: object) -> NDArray[np.generic]:
         dtype = DTYPES.get(name) if isinstance(name, str) else None

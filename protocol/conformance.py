@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import cast
 
 import numpy as np
@@ -102,16 +103,10 @@ class _Hint(Exception):
 
 OURS = "robospa.v1"
 EXACT = "the policy needs the exact state, which only a simulator can give"
-ASKED = (
-    "actions",
-    "latency",
-    "concurrent sessions",
-    "determinism",
-    "real-time chunking",
-)
+AT_ONCE = "concurrent sessions"
+ASKED = ("actions", "latency", AT_ONCE, "determinism", "real-time chunking")
 """Checks that ask for actions."""
 SHARED = "its model keeps one state for all connections: one trial at a time"
-AT_ONCE = "concurrent sessions"
 REQUESTS, SESSIONS = 6, 4
 CLOSE = 1e-2
 """How far actions of a seeded policy may be off in another batch: half precision."""
@@ -125,16 +120,9 @@ class _Target:
     token: str | None
     timeouts: Timeouts
     ssl: ssl_module.SSLContext | None
-    connector: Callable[[], RemotePolicy] | None = None
-    shared_state: bool = False
-    sign: Callable[[str], str] = lambda dialect: ""
+    connect: Callable[[], RemotePolicy]
     dialect: str = ""
     spec: PolicySpec = field(default_factory=lambda: PolicySpec("unknown"))
-
-    def connect(self) -> RemotePolicy:
-        if self.connector is not None:
-            return self.connector()
-        return connect(self.url, self.token, self.timeouts, ssl=self.ssl)
 
     @contextmanager
     def raw(self) -> Iterator[Transport]:
@@ -163,19 +151,25 @@ def check(
     `connector` reaches in another dialect; `shared_state` as its dialect says; `sign` gives that by
     which a dialect is known. Raises nothing of the server's making: what goes wrong becomes a
     failed check. Stops after a failed handshake."""
-    target = _Target(url, token, timeouts or Timeouts(), ssl, connector, shared_state, sign)
+    limits = timeouts or Timeouts()
+    ours = partial(connect, url, token, limits, ssl=ssl)
+    target = _Target(url, token, limits, ssl, connector or ours)
     results = []
     for name, function in CHECKS.items():
-        result = _run(name, function, target)
+        if name == AT_ONCE and shared_state:
+            result = CheckResult(name, None, SHARED)
+        else:
+            result = _run(name, function, target)
+        if name == "handshake":
+            if not result.passed:
+                return [result]
+            if because := sign(target.dialect):
+                result = replace(result, detail=f"{result.detail}, because {because}")
         results.append(result)
-        if name == "handshake" and not result.passed:
-            break
     return results
 
 
 def _run(name: str, function: Callable[[_Target], str], target: _Target) -> CheckResult:
-    if name == AT_ONCE and target.shared_state:
-        return CheckResult(name, None, SHARED)
     if name in ASKED and target.spec.privileged:
         return CheckResult(name, None, EXACT)
     try:
@@ -195,13 +189,10 @@ def _handshake(target: _Target) -> str:
     with target.connect() as policy:
         target.dialect, target.spec = policy.dialect, policy.spec
         hello = policy.hello
-        sign = target.sign(policy.dialect)
-        because = f", because {sign}" if sign else ""
         if policy.dialect != OURS:
             server = f", {hello['server']!r}" if hello.get("server") else ""
-            return f"speaks the dialect {policy.dialect}{server}{because}"
-        version = f"version {hello['version']} (ours {VERSION})"
-        return f"robospa.v1, {version}, {hello['server']!r}{because}"
+            return f"speaks the dialect {policy.dialect}{server}"
+        return f"robospa.v1, version {hello['version']} (ours {VERSION}), {hello['server']!r}"
 
 
 def _spec(target: _Target) -> str:
@@ -403,7 +394,7 @@ CHECKS: dict[str, Callable[[_Target], str]] = {
     "requests in order": _order,
     "error, then recovery": _bad_observation,
     "unknown fields": _unknown_fields,
-    "concurrent sessions": _concurrent,
+    AT_ONCE: _concurrent,
     "determinism": _determinism,
     "real-time chunking": _real_time_chunking,
     "garbage": _garbage,

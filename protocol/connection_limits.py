@@ -190,24 +190,12 @@ class ConnectionLimiter:
         """For `create_connection` of websockets: connections that report to this limiter."""
         return type("LimitedConnection", (MonitoredConnection,), {"limiter": self})
 
-    @property
-    def sockets(self) -> int:
-        """Sockets that are open, handshakes included."""
-        return len(self._open)
-
-    @property
-    def sessions(self) -> int:
-        """Places that are taken."""
-        return len(self._sessions)
-
     def start(self) -> None:
-        """Begin to check the connections."""
         loop = asyncio.get_running_loop()
         loop.set_exception_handler(self._accept_failed)
         self._task = loop.create_task(self._check_all())
 
     def stop(self) -> None:
-        """End the checks."""
         if self._task is not None:
             self._task.cancel()
 
@@ -261,12 +249,10 @@ class ConnectionLimiter:
         return False
 
     def session_began(self, connection: MonitoredConnection) -> None:
-        """The handshake is over and the handler runs."""
         self._handshakes.pop(connection, None)
         connection.in_session = True
 
     def session_ended(self, connection: MonitoredConnection) -> None:
-        """The handler has returned."""
         connection.in_session = False
         self._sessions.pop(connection, None)
 

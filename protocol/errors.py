@@ -178,11 +178,16 @@ def error_sentence(error: BaseException) -> str:
     name = type(error).__name__
     said = f"{name}: {text}" if text else name
     frames = [trace for trace in _frames(error.__traceback__) if not _calls(trace)]
-    own = [trace for trace in frames if not _is_library(trace)]
     if not frames:
         return said
-    last = (own or frames)[-1]
-    return f"{said} ({Path(_file(last)).name}:{last.tb_lineno})"
+    places = [(trace.tb_frame.f_code.co_filename, trace.tb_lineno) for trace in frames]
+    own = [
+        (file, line)
+        for file, line in places
+        if not file.startswith(STANDARD) and not any(folder in file for folder in INSTALLED)
+    ]
+    file, line = (own or places)[-1]
+    return f"{said} ({Path(file).name}:{line})"
 
 
 def policy_traceback(error: BaseException) -> str:
@@ -199,12 +204,3 @@ def _frames(trace: TracebackType | None) -> Iterator[TracebackType]:
 
 def _calls(trace: TracebackType) -> bool:
     return str(trace.tb_frame.f_globals.get("__name__", "")).startswith(CALLERS)
-
-
-def _is_library(trace: TracebackType) -> bool:
-    file = _file(trace)
-    return file.startswith(STANDARD) or any(folder in file for folder in INSTALLED)
-
-
-def _file(trace: TracebackType) -> str:
-    return trace.tb_frame.f_code.co_filename

@@ -1,15 +1,7 @@
 """openpi's dialect at our server: its clients' observations, and the conversation with one.
 
-A client that offers no subprotocol is openpi's. Our client to servers of this kind is
-`robospa.clients.openpi_family`, which takes the names of the cameras from here.
-
-    ours                openpi (Aloha)
-    images.head         images.cam_high            uint8 (3, H, W) RGB; read too: (H, W, 3), or 0..1
-    images.left_wrist   images.cam_left_wrist
-    images.right_wrist  images.cam_right_wrist
-    images.front        images.cam_low
-    state               state                      (14,) float64, read as float32
-    instruction         prompt
+A client that offers no subprotocol is openpi's. It sends `images` by the names of `CAMERA_NAMES`,
+uint8 (3, H, W) RGB (read too: (H, W, 3), or 0..1), `state` (14,) float64, and the `prompt`.
 """
 
 import logging

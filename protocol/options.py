@@ -34,9 +34,10 @@ class OptionRow:
     help: str
 
 
-def option(default: Any, help: str, choices: Sequence[str] = ()) -> Any:
-    """A field of an options dataclass."""
-    return dataclasses.field(default=default, metadata={"help": help, "choices": tuple(choices)})
+def option(default: Any, help: str, choices: Sequence[str] = (), needed: bool = False) -> Any:
+    """A field of an options dataclass; one that is `needed` may not be left empty."""
+    told = {"help": help, "choices": tuple(choices), "needed": needed}
+    return dataclasses.field(default=default, metadata=told)
 
 
 def read_options(cls: type[T], given: Mapping[str, Any]) -> T:
@@ -59,7 +60,11 @@ def read_options(cls: type[T], given: Mapping[str, Any]) -> T:
 
 def check_ranges(options: object) -> None:
     """Raises ValueError, in one sentence that says what is allowed, for a number of an options
-    dataclass that is not finite or not within the bounds (msgspec's `Meta`) of its annotation."""
+    dataclass that is not finite or not within the bounds (msgspec's `Meta`) of its annotation, and
+    for an option that is needed and not given."""
+    for field in dataclasses.fields(options):  # type: ignore[arg-type]
+        if field.metadata.get("needed") and not getattr(options, field.name):
+            raise ValueError(f"option {field.name} is needed: {field.metadata['help']}")
     for name, hint in typing.get_type_hints(type(options), include_extras=True).items():
         value = getattr(options, name)
         if isinstance(value, bool) or not isinstance(value, (int, float)):

@@ -2,16 +2,14 @@
 
 Three ways to hand over a policy, by what it knows about sessions:
 
-    policy_factory   a function that makes one policy object per connection: right for every
-                     policy that remembers anything between calls. Weights belong in the closure.
-    `infer_batch`    a policy with this member serves all connections. It keeps per-trial state by
-                     session number, or none at all; if it has `reset_session(session, trial)` and
-                     `end_session(session)`, these are called instead of `reset(trial)`.
+    policy_factory   makes one policy object per connection: right for every policy that remembers
+                     anything between calls. Weights belong in the closure.
+    `infer_batch`    a policy with this member serves all connections, and keeps what belongs to a
+                     trial by session number, if anything (`OptionalMembers`).
     any other policy one object, hence one connection at a time; a second one is refused, because
                      two trials would share its state unnoticed.
 
-A policy may have `end(outcome)` and `close()`. It is called from `threads` threads, one by default:
-then it need not be thread-safe.
+It is called from `threads` threads, one by default: then it need not be thread-safe.
 """
 
 import asyncio
@@ -62,7 +60,10 @@ class PolicyThreads:
                 answer = call(*args)
                 outcome = lambda: future.set_result(answer)  # noqa: E731
             except BaseException as error:
-                failure = _as_exception(error)
+                # SystemExit must end neither thread nor server; no future takes StopIteration
+                taken = isinstance(error, Exception) and not isinstance(error, StopIteration)
+                text = f"the policy raised {type(error).__name__}: {error}"
+                failure = error if taken else RuntimeError(text)
                 outcome = lambda: future.set_exception(failure)  # noqa: E731
             with contextlib.suppress(RuntimeError):  # the loop is closed: nobody waits
                 loop.call_soon_threadsafe(deliver, outcome)
@@ -90,13 +91,6 @@ class PolicyThreads:
         while (job := self._jobs.get()) is not None:
             job()
             del job  # an idle thread must not keep the last observation alive
-
-
-def _as_exception(error: BaseException) -> Exception:
-    """An error that a future can carry: SystemExit must end neither thread nor server."""
-    if isinstance(error, Exception) and not isinstance(error, StopIteration):
-        return error
-    return RuntimeError(f"the policy raised {type(error).__name__}: {error}")
 
 
 class PolicySession:
@@ -193,11 +187,6 @@ class PolicyHost:
         self._numbers = itertools.count(1)
         self._batcher = Batcher(self._infer_batch, self.spec.batch, queue) if batched else None
 
-    @property
-    def waiting(self) -> int:
-        """Requests that wait for a call of a batch policy."""
-        return 0 if self._batcher is None else self._batcher.waiting
-
     async def open(self) -> PolicySession:
         """A session for a new connection."""
         if self._policy is not None and self._batcher is not None:
@@ -217,7 +206,6 @@ class PolicyHost:
         return await self._threads.run(self._policy.infer_batch, observations, sessions)
 
     def close(self) -> None:
-        """Let go of the threads."""
         self._threads.close()
 
 

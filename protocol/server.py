@@ -2,11 +2,8 @@
 
 `serve(policy, host, port)` runs until it is interrupted; `ServerThread` is the same inside another
 program. A client that offers `robospa.v1` gets it, one that offers nothing gets openpi's dialect,
-one that offers another version of ours is refused. `GET /healthz` answers 200.
-
-A token, if set, is required at the handshake (`Authorization: Bearer ...`, or `Api-Key ...` as
-openpi's client sends it) and compared in constant time. Browsers are refused (no `Origin`). Without
-TLS (`ssl`) tokens and frames travel in the clear.
+one that offers another version of ours is refused. `GET /healthz` answers 200. A token, if set, is
+required at the handshake (`Bearer ...`, or `Api-Key ...` as openpi's client sends it).
 """
 
 from __future__ import annotations
@@ -18,7 +15,7 @@ import logging
 import signal
 import ssl as ssl_module
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass, field
 from http import HTTPStatus
 from typing import TYPE_CHECKING
@@ -47,6 +44,7 @@ log = logging.getLogger("robospa.server")
 LIBRARY_LOG = logging.getLogger("robospa.server.websockets")
 """What websockets logs of clients, with tracebacks; ours is one line each."""
 LIBRARY_LOG.setLevel(logging.CRITICAL)
+OFFERED = Subprotocol(SUBPROTOCOL)
 LAST_ANSWER = 0.1
 """[s] in which a handler whose connection is closed may return by itself."""
 
@@ -91,11 +89,19 @@ class ConnectionHandler:
         try:
             request = messages.read_message(value)
             if isinstance(request, messages.Reset):
-                return await self._reset(request)
+                self._in_trial = False
+                await self.policy.reset(request.trial)
+                self._in_trial = True
+                return messages.Ready(id)
+            if isinstance(request, messages.Infer | messages.End) and not self._in_trial:
+                why = f"{request.type} needs a successful reset first"
+                return Error(id, messages.NO_TRIAL, why, retriable=True)
             if isinstance(request, messages.Infer):
                 return await self._infer(request)
             if isinstance(request, messages.End):
-                return await self._end(request)
+                self._in_trial = False
+                await self.policy.end(request.outcome)
+                return messages.Ended(id)
             raise errors.DecodeError(f"a client may not send {request.type}")
         except errors.DecodeError as error:
             return Error(id, messages.BAD_MESSAGE, str(error))
@@ -108,15 +114,7 @@ class ConnectionHandler:
             retriable = getattr(error, "retriable", True)
             return Error(id, errors.POLICY_FAILED, said, retriable, self.policy.usage)
 
-    async def _reset(self, request: messages.Reset) -> Message:
-        self._in_trial = False
-        await self.policy.reset(request.trial)
-        self._in_trial = True
-        return messages.Ready(request.id)
-
     async def _infer(self, request: messages.Infer) -> Message:
-        if not self._in_trial:
-            return self._no_trial(request)
         received = request.observation
         try:
             if self.spec.image_codec == "jpeg":
@@ -133,17 +131,6 @@ class ConnectionHandler:
             used = self.policy.usage
             return Error(request.id, messages.BAD_ANSWER, str(error), timing=used)
 
-    async def _end(self, request: messages.End) -> Message:
-        if not self._in_trial:
-            return self._no_trial(request)
-        self._in_trial = False
-        await self.policy.end(request.outcome)
-        return messages.Ended(request.id)
-
-    def _no_trial(self, request: Message) -> Message:
-        why = f"{request.type} needs a successful reset first"
-        return Error(request.id, messages.NO_TRIAL, why, True)
-
     async def _send(self, message: Message) -> None:
         await self.socket.send(messages.pack(message, self.limits))
 
@@ -158,16 +145,6 @@ async def refuse(socket: MonitoredConnection, ours: bool, error: Exception) -> N
     reason = errors.error_sentence(error)
     await socket.send(messages.pack(Error(0, errors.POLICY_FAILED, reason)) if ours else reason)
     await socket.close(1011, "no policy for this connection")
-
-
-@dataclass(frozen=True)
-class ServerLoad:
-    """What a server has to do right now: open sockets (handshakes included), sessions, and requests
-    that wait for a call of a batch policy."""
-
-    sockets: int
-    sessions: int
-    waiting: int
 
 
 @dataclass(eq=False)
@@ -199,12 +176,6 @@ class PolicyServer:
         self._limiter = ConnectionLimiter(places, options)
         self._server: Server | None = None
 
-    @property
-    def load(self) -> ServerLoad:
-        """How busy the server is; may be read from any thread."""
-        limiter = self._limiter
-        return ServerLoad(limiter.sockets, limiter.sessions, self._policies.waiting)
-
     async def __aenter__(self) -> Self:
         keep_freed_memory()
         self._server = await websocket_serve(
@@ -213,7 +184,7 @@ class PolicyServer:
             self.port,
             ssl=self.ssl,
             origins=[None],
-            select_subprotocol=_select,
+            select_subprotocol=lambda _, offered: OFFERED if OFFERED in offered else None,
             process_request=self._admit,
             create_connection=self._limiter.connection_type,
             server_header=None,
@@ -390,10 +361,6 @@ def serve(
             await stop.wait()
 
     asyncio.run(main())
-
-
-def _select(connection: ServerConnection, offered: Sequence[Subprotocol]) -> Subprotocol | None:
-    return Subprotocol(SUBPROTOCOL) if SUBPROTOCOL in offered else None
 
 
 def _authorized(token: str | None, request: Request) -> bool:

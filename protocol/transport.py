@@ -17,6 +17,7 @@ import struct
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from http import HTTPStatus
 from typing import Any, TypeVar
 from urllib.parse import urljoin, urlsplit
@@ -270,16 +271,12 @@ def _open(
 ) -> tuple[ClientConnection, str]:
     """The connection, and the address where it was made in the end."""
     for _ in range(1 + REDIRECTS):
-        here = address
-
-        def attempt() -> ClientConnection:
-            return _attempt(here, timeouts, limits, offer)  # noqa: B023
-
+        attempt = partial(_attempt, address, timeouts, limits, offer)
         try:
-            return connect_until(here.url, timeouts.wait, attempt), here.url
+            return connect_until(address.url, timeouts.wait, attempt), address.url
         except _Redirected as error:
-            address = _moved(here, str(error))
-    raise errors.HandshakeError(f"{here.url} redirects for ever")
+            address = _moved(address, str(error))
+    raise errors.HandshakeError(f"{address.url} redirects for ever")
 
 
 def _attempt(
