@@ -21,7 +21,6 @@ from robospa.protocol.errors import (
     ConnectFailed,
     HandshakeError,
     PolicyAnswerError,
-    ServerError,
     TransportError,
 )
 from robospa.protocol.server import ServerThread
@@ -69,10 +68,7 @@ def test_what_the_model_reads_of_an_instruction_is_declared(name: str) -> None:
         assert policy.spec.text_budget == 7
 
 
-SPACES = ("xpolicylab", "vla-eval", "robotwin")
-
-
-@pytest.mark.parametrize("name", SPACES)
+@pytest.mark.parametrize("name", ["xpolicylab", "vla-eval", "robotwin"])
 def test_poses_in_joint_space_name_the_option(name: str) -> None:
     with pytest.raises(PolicyAnswerError, match=r"\?space=ee"):
         ask(name, lambda seen: np.zeros((2, 16)))
@@ -99,23 +95,6 @@ def test_numbers_under_a_name_that_nobody_reads_are_refused(name: str, value: An
 def test_remarks_beside_the_actions_are_harmless(name: str) -> None:
     remarks = {"model": "x", "confidence": 0.5, "done": False, "notes": ["a"], "nothing": None}
     assert ask_with(name, **remarks).shape == joint_chunk().shape
-
-
-STRICT_JSON = ("go1", "xvla")
-"""Servers that cannot send NaN: they fail in the attempt, and give no reason."""
-
-
-@every_dialect
-@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
-def test_numbers_that_are_not_finite_are_the_policys_error(name: str, bad: float) -> None:
-    chunk = joint_chunk()
-    chunk[1, 4] = bad
-    if name in STRICT_JSON and bad != 1e300:
-        with pytest.raises(ServerError, match="actions of NaN or infinity"):
-            ask(name, lambda seen: chunk)
-        return
-    with pytest.raises(PolicyAnswerError, match="in action 1, dimension 4"):
-        ask(name, lambda seen: chunk)
 
 
 @pytest.mark.parametrize("scheme", [dialect.scheme for dialect in dialects()])
@@ -250,8 +229,7 @@ def test_check_asks_a_server_with_one_state_one_trial_at_a_time(name: str) -> No
     with DIALECTS[name][0]() as url:
         target = target_of(url)
         assert target.dialect.shared_state
-        connector = target.connect
-        found = check(url, timeouts=QUICK, connector=connector, shared_state=True)
+        found = check(url, timeouts=QUICK, connector=target.connect, shared_state=True)
     passed = {result.name: result.passed for result in found}
     assert passed["concurrent sessions"] is None
     assert passed["actions"]

@@ -199,12 +199,13 @@ def twice(name: str) -> Exception:
     return caught.value
 
 
-def spoiled() -> Any:
+def spoiled(number: float) -> Any:
     chunk = joint_chunk()
-    chunk[1, 4] = np.nan
+    chunk[1, 4] = number
     return chunk
 
 
+PLACE = "in action 1, dimension 4"
 LATE = r"within 0\.3 s; look at the server's log"
 CASES: dict[str, tuple[type[Exception], Callable[[str], Exception], str]] = {
     "hangs": (CallTimeout, broken("hang", SHORT), LATE),
@@ -214,7 +215,9 @@ CASES: dict[str, tuple[type[Exception], Callable[[str], Exception], str]] = {
     "announces 2 GB": (TransportError, broken("huge"), "over|more than"),
     "answers twice": (TransportError, twice, "came to|not requested"),
     "fails": (PolicyError, failing, "the server reported "),
-    "nan": (PolicyError, answering(spoiled()), "nan in action 1, dimension 4|NaN"),
+    "nan": (PolicyError, answering(spoiled(np.nan)), f"nan {PLACE}|actions of NaN"),
+    "infinity": (PolicyError, answering(spoiled(np.inf)), f"inf {PLACE}|actions of NaN"),
+    "too large": (PolicyError, answering(spoiled(1e300)), f"inf {PLACE}"),
     "shape": (PolicyError, answering(np.zeros((2, 13))), "not|but a joint"),
     "many": (PolicyError, answering(np.zeros((10_001, 14))), "from 1 to 10000"),
     "texts": (PolicyError, answering(np.full((2, 14), "0.5")), "the policy answered"),

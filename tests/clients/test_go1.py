@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from model_fakes import COLORS, close, color_of, first, install, seen, tensor, trial
 from standins import QUICK, first_request
-from standins_http import HEAD, LEFT, RIGHT, STATE, Go1, image, observation
+from standins_http import STATE, Go1, observation, shows
 from wire_helpers import self_signed
 
 from robospa.clients import connect, go1
@@ -32,9 +32,7 @@ def test_go1_is_sent_what_its_server_reads() -> None:
     server = Go1()
     sent = first_request(server)
     assert sent.keys() == {"top", "left", "right", "instruction", "state", "ctrl_freqs"}
-    for theirs, ours in (("top", HEAD), ("left", LEFT), ("right", RIGHT)):
-        assert sent[theirs].dtype == np.uint8
-        assert np.array_equal(sent[theirs], image(ours))
+    shows(sent, "top", "left", "right")
     assert sent["state"].shape == (1, 14)
     assert sent["state"].dtype == np.float64
     assert np.array_equal(sent["state"][0], STATE)

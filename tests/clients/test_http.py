@@ -29,7 +29,6 @@ from robospa.clients.dialect import ConnectionParams, Dialect, dialects
 from robospa.clients.http import JsonServer
 from robospa.clients.robotwin import robotwin_observation
 from robospa.clients.xpolicylab import XPolicyLabClientOptions, decode, robot_state
-from robospa.observation import Observation
 from robospa.protocol.errors import CallTimeout, HandshakeError, TransportError
 from robospa.protocol.options import option_table, plain_options, read_options, url_options
 from robospa.protocol.server import ServerThread
@@ -282,13 +281,7 @@ def test_a_budget_is_warned_about_only_when_it_is_broken() -> None:
 
 JOINTS = (6, 7)
 STATE = np.arange(15, dtype=np.float32) / 15
-POSES = np.tile(np.array([0.1, 0, 1, 1, 0, 0, 0, 0.5], np.float32), (2, 1))
-
-
-def seen() -> Observation:
-    image = np.zeros((240, 320, 3), np.uint8)
-    cameras = ("head", "left_wrist", "right_wrist", "front")
-    return {"state": STATE, "ee": POSES, "images": dict.fromkeys(cameras, image), "step": 0}
+SEEN: Any = observation(state=STATE)
 
 
 def test_every_dialect_says_which_robot_its_servers_drive() -> None:
@@ -298,11 +291,11 @@ def test_every_dialect_says_which_robot_its_servers_drive() -> None:
 
 
 def test_arms_of_six_and_seven_joints_are_sent_one_by_one() -> None:
-    sent = robotwin_observation(seen(), JOINTS)["joint_action"]
+    sent = robotwin_observation(SEEN, JOINTS)["joint_action"]
     assert isinstance(sent, dict)
     assert (len(sent["left_arm"]), len(sent["right_arm"])) == JOINTS
     assert (sent["left_gripper"], sent["right_gripper"]) == pytest.approx((STATE[6], STATE[14]))
-    state = robot_state(seen(), JOINTS)
+    state = robot_state(SEEN, JOINTS)
     assert len(state["right_arm_joint_state"]) == 7
     assert state["right_ee_joint_state"] == pytest.approx(STATE[14:])
 
@@ -310,7 +303,7 @@ def test_arms_of_six_and_seven_joints_are_sent_one_by_one() -> None:
 def test_closed_grippers_of_such_arms_are_turned_round() -> None:
     options = XPolicyLabClientOptions(grippers="closed")
     answer = {"actions": np.zeros((2, 15), np.float32)}
-    chunk = decode(answer, seen(), options, JOINTS)
+    chunk = decode(answer, SEEN, options, JOINTS)
     grippers = ActionSpace("joint", JOINTS).grippers
     assert isinstance(chunk, np.ndarray)
     assert np.flatnonzero(chunk[0]).tolist() == grippers == [6, 14]

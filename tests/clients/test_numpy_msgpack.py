@@ -30,9 +30,17 @@ def test_arrays_come_back(form: Any) -> None:
     assert np.array_equal(unpack(encode([sent], form=form), DEFAULT_LIMITS)[0], sent)
 
 
+def array(**changes: Any) -> Any:
+    good = {"__ndarray__": True, "data": bytes(56), "dtype": "<f4", "shape": [1, 14]}
+    return msgpack.packb({**good, **changes})
+
+
 @pytest.mark.parametrize(
     ("data", "told"),
     [
+        *((array(dtype=kind), "refused") for kind in ("|O", "V4", "<c8", 7, "f4,(", "3f4")),
+        *((array(shape=shape), "cannot be") for shape in ([2, 14], "x")),
+        (array(data="text"), "without bytes"),
         (b"\xdf\x00\x01\x86\x9f" * 1000, "99999 members announced"),
         (msgpack.packb({b"nd": True, b"type": "<f4", b"kind": b"V"}), "objects or structures"),
         (b"\x81\x90\xc0", "key"),

@@ -12,7 +12,17 @@ import numpy as np
 import pytest
 from model_fakes import first, install, seen, trial
 from standins import QUICK, Family, OpenPi, answered, talking
-from standins_http import HEAD, LEFT, OPENPI, RIGHT, STATE, TRIAL, image, joint_chunk, observation
+from standins_http import (
+    HEAD,
+    LEFT,
+    OPENPI,
+    STATE,
+    TRIAL,
+    image,
+    joint_chunk,
+    observation,
+    shows,
+)
 from websockets.protocol import State
 from wire_helpers import until
 
@@ -46,12 +56,9 @@ def test_openpi_is_sent_what_its_server_reads(scheme: str) -> None:
         assert any("adapt_to_pi" in text for text in policy.hello["warnings"])
     sent = server.requests[0]
     assert sent.keys() == {"images", "state", "prompt"}
-    names = {"cam_high": HEAD, "cam_left_wrist": LEFT, "cam_right_wrist": RIGHT}
-    assert sent["images"].keys() == names.keys()
-    for theirs, ours in names.items():
-        assert sent["images"][theirs].dtype == np.uint8
-        assert sent["images"][theirs].shape == (3, 240, 320)
-        assert np.array_equal(np.moveaxis(sent["images"][theirs], 0, -1), image(ours))
+    names = ("cam_high", "cam_left_wrist", "cam_right_wrist")
+    assert sent["images"].keys() == {*names}
+    shows({name: np.moveaxis(shown, 0, -1) for name, shown in sent["images"].items()}, *names)
     assert sent["state"].dtype == np.float64
     assert np.array_equal(sent["state"], STATE)
     assert sent["prompt"] == "pick the red block"
@@ -143,10 +150,7 @@ def test_after_a_text_frame_the_connection_is_gone() -> None:
         (b"\xc1", ProtocolViolation),
         (msgpack.packb([1]), ProtocolViolation),
         (msgpack.packb({"a": 1}), PolicyAnswerError),
-        (
-            msgpack.packb({"actions": np.array([["1"] * 14])}, default=OPENPI.write),
-            PolicyAnswerError,
-        ),
+        (msgpack.packb({"actions": [["1"] * 14]}), PolicyAnswerError),
     ],
 )
 def test_answers_that_cannot_be(frame: bytes, error: Any) -> None:
@@ -230,11 +234,7 @@ def test_a_configuration_of_robotwin_is_served(monkeypatch: pytest.MonkeyPatch) 
 
 
 MODEL = SimpleNamespace(
-    action_horizon=50,
-    action_dim=32,
-    max_token_len=200,
-    discrete_state_input=True,
-    dtype="bfloat16",
+    action_horizon=50, action_dim=32, max_token_len=200, discrete_state_input=True, dtype="bfloat16"
 )
 
 

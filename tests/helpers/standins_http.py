@@ -25,6 +25,13 @@ def image(name: str) -> Any:
     return np.stack(colors, axis=-1).astype(np.uint8)
 
 
+def shows(found: Any, *names: str) -> None:
+    """`found` has under these names what head, left and right wrist see, uint8 and unchanged."""
+    for theirs, ours in zip(names, (HEAD, LEFT, RIGHT), strict=True):
+        assert found[theirs].dtype == np.uint8
+        assert np.array_equal(found[theirs], image(ours))
+
+
 STATE = np.array(
     [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.25, -0.1, -0.2, -0.3, -0.4, -0.5, -0.6, 0.75], np.float32
 )

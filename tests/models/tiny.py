@@ -14,6 +14,7 @@ import os
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -80,55 +81,52 @@ def tokenizer(folder: Path) -> str:
     return str(folder)
 
 
+def built(kind: str, **config: Any) -> Any:
+    """LeRobot's policy whose classes begin with `kind`, of this configuration."""
+    name = kind.lower()
+    settings = import_module(f"lerobot.policies.{name}.configuration_{name}")
+    models = import_module(f"lerobot.policies.{name}.modeling_{name}")
+    config_of, policy_of = getattr(settings, f"{kind}Config"), getattr(models, f"{kind}Policy")
+    return policy_of(config_of(device="cpu", **config))
+
+
 def act(folder: Path, views: Views) -> Any:
     """ACT without patches: one camera, no pre-trained backbone."""
-    from lerobot.policies.act.configuration_act import ACTConfig
-    from lerobot.policies.act.modeling_act import ACTPolicy
-
-    return ACTPolicy(
-        ACTConfig(
-            **features(14, (240, 320), views[:1]),
-            chunk_size=50,
-            n_action_steps=50,
-            dim_model=128,
-            n_heads=4,
-            dim_feedforward=512,
-            n_encoder_layers=2,
-            n_decoder_layers=1,
-            use_vae=False,
-            pretrained_backbone_weights=None,
-            device="cpu",
-        )
+    return built(
+        "ACT",
+        **features(14, (240, 320), views[:1]),
+        chunk_size=50,
+        n_action_steps=50,
+        dim_model=128,
+        n_heads=4,
+        dim_feedforward=512,
+        n_encoder_layers=2,
+        n_decoder_layers=1,
+        use_vae=False,
+        pretrained_backbone_weights=None,
     )
 
 
 def diffusion(folder: Path, views: Views) -> Any:
     """Diffusion policy without patches: one camera, two frames."""
-    from lerobot.policies.diffusion.configuration_diffusion import DiffusionConfig
-    from lerobot.policies.diffusion.modeling_diffusion import DiffusionPolicy
-
-    return DiffusionPolicy(
-        DiffusionConfig(
-            **features(14, (96, 128), views[:1]),
-            n_obs_steps=2,
-            horizon=16,
-            n_action_steps=8,
-            crop_shape=(84, 112),
-            pretrained_backbone_weights=None,
-            down_dims=(32, 64),
-            diffusion_step_embed_dim=16,
-            spatial_softmax_num_keypoints=8,
-            num_train_timesteps=10,
-            num_inference_steps=4,
-            device="cpu",
-        )
+    return built(
+        "Diffusion",
+        **features(14, (96, 128), views[:1]),
+        n_obs_steps=2,
+        horizon=16,
+        n_action_steps=8,
+        crop_shape=(84, 112),
+        pretrained_backbone_weights=None,
+        down_dims=(32, 64),
+        diffusion_step_embed_dim=16,
+        spatial_softmax_num_keypoints=8,
+        num_train_timesteps=10,
+        num_inference_steps=4,
     )
 
 
 def xvla(folder: Path, views: Views) -> Any:
     """X-VLA without patches, 0.86 million parameters."""
-    from lerobot.policies.xvla.configuration_xvla import XVLAConfig
-    from lerobot.policies.xvla.modeling_xvla import XVLAPolicy
 
     vision = {
         "embed_dim": [16, 32, 64, 64],
@@ -153,21 +151,19 @@ def xvla(folder: Path, views: Views) -> Any:
         "eos_token_id": 1,
         "bos_token_id": 2,
     }
-    return XVLAPolicy(
-        XVLAConfig(
-            **features(20, (224, 224), views),
-            florence_config={"vision_config": vision, "text_config": text, "image_token_id": 300},
-            tokenizer_name=tokenizer(folder / "tokenizer"),
-            tokenizer_max_length=50,
-            hidden_size=64,
-            depth=2,
-            num_heads=4,
-            chunk_size=30,
-            n_action_steps=30,
-            max_state_dim=20,
-            action_mode="ee6d",
-            device="cpu",
-        )
+    return built(
+        "XVLA",
+        **features(20, (224, 224), views),
+        florence_config={"vision_config": vision, "text_config": text, "image_token_id": 300},
+        tokenizer_name=tokenizer(folder / "tokenizer"),
+        tokenizer_max_length=50,
+        hidden_size=64,
+        depth=2,
+        num_heads=4,
+        chunk_size=30,
+        n_action_steps=30,
+        max_state_dim=20,
+        action_mode="ee6d",
     )
 
 
@@ -206,26 +202,20 @@ def shrink_pi05() -> None:
 def pi05(folder: Path, views: Views) -> Any:
     """pi0.5 with the three patches."""
     shrink_pi05()
-    from lerobot.policies.pi05.configuration_pi05 import PI05Config
-    from lerobot.policies.pi05.modeling_pi05 import PI05Policy
 
     tokenizer(folder / "tokenizer")
-    return PI05Policy(
-        PI05Config(
-            **features(14, (240, 320), views),
-            image_resolution=(56, 56),
-            chunk_size=10,
-            n_action_steps=10,
-            num_inference_steps=2,
-            device="cpu",
-        )
+    return built(
+        "PI05",
+        **features(14, (240, 320), views),
+        image_resolution=(56, 56),
+        chunk_size=10,
+        n_action_steps=10,
+        num_inference_steps=2,
     )
 
 
 def smolvla(folder: Path, views: Views) -> Any:
     """SmolVLA without patches: LeRobot takes its language model's sizes from a folder."""
-    from lerobot.policies.smolvla.configuration_smolvla import SmolVLAConfig
-    from lerobot.policies.smolvla.modeling_smolvla import SmolVLAPolicy
     from transformers import (
         AutoTokenizer,
         SmolVLMConfig,
@@ -261,17 +251,15 @@ def smolvla(folder: Path, views: Views) -> Any:
     SmolVLMProcessor(SmolVLMImageProcessor(), words, SmolVLMVideoProcessor()).save_pretrained(
         str(language)
     )
-    return SmolVLAPolicy(
-        SmolVLAConfig(
-            **features(14, (240, 320), views),
-            vlm_model_name=str(language),
-            resize_imgs_with_padding=(64, 64),
-            num_vlm_layers=2,
-            chunk_size=10,
-            n_action_steps=10,
-            num_steps=2,
-            device="cpu",
-        )
+    return built(
+        "SmolVLA",
+        **features(14, (240, 320), views),
+        vlm_model_name=str(language),
+        resize_imgs_with_padding=(64, 64),
+        num_vlm_layers=2,
+        chunk_size=10,
+        n_action_steps=10,
+        num_steps=2,
     )
 
 

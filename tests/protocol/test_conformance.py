@@ -23,7 +23,9 @@ def test_our_server_passes_everything(start: Any) -> None:
     server = start(
         policy_factory=lambda: Recall(replace(SPEC, seeded=True, committed_actions=True))
     )
-    assert verdicts(server.url) == dict.fromkeys(CHECKS, True)
+    found = {result.name: result for result in check(server.url, timeouts=QUICK)}
+    assert {name: one.passed for name, one in found.items()} == dict.fromkeys(CHECKS, True)
+    assert "speaks robospa.v1, not robospa.v999" in found["foreign version refused"].detail
 
 
 def test_our_server_passes_in_openpis_dialect(start: Any) -> None:
@@ -46,7 +48,7 @@ def test_a_server_of_another_version() -> None:
     with scripted(pack(Hello(0, "99.0", "s", SPEC))) as url:
         results = check(url, timeouts=QUICK)
     assert [(r.name, r.passed) for r in results] == [("handshake", False)]
-    assert "99.0" in results[0].detail
+    assert "99.0" in results[0].detail and "same major version" in results[0].detail
 
 
 @pytest.mark.parametrize("bad", [np.full((2, 14), np.nan, "f4"), np.zeros((9, 14), "f4")])

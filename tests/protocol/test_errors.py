@@ -113,9 +113,10 @@ def test_the_refusal_says_where_a_token_goes() -> None:
     for made in (find_endpoint, connect):
         with pytest.raises(ValueError, match="--token, ROBOSPA_TOKEN or token="):
             made("ws://me:hunter2@gpu:8000")
-    with pytest.raises(ValueError, match="not of the form ws://host:port") as refusal:
-        connect_ours("ws://me:hunter2@gpu:8000")
-    assert "hunter2" not in str(refusal.value)
+    for url in ("ws://me:hunter2@gpu:8000", "http://localhost:1", "localhost:8000", "ws://"):
+        with pytest.raises(ValueError, match="not of the form ws://host:port") as refusal:
+            connect_ours(url)
+        assert "hunter2" not in str(refusal.value)
     assert sentence(ValueError("no ws://a:hunter2@b")) == "no ws://***@b"
 
 

@@ -1,6 +1,5 @@
 """The server: errors that leave it usable, and sessions that are kept apart."""
 
-import json
 import socket
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -12,7 +11,6 @@ import numpy as np
 import pytest
 from wire_helpers import (
     QUICK,
-    SPEC,
     TRIAL,
     Recall,
     Together,
@@ -101,14 +99,6 @@ def test_an_observation_that_does_not_fit_keeps_the_trial(start: Any) -> None:
             remote.infer(observation(images={"head": np.zeros((6, 8, 1), np.uint8)}))
         assert caught.value.code == "bad_observation"
         assert remote.infer(observation(4))[0, 0] == 4
-
-
-def test_the_privileged_state_arrives(start: Any) -> None:
-    policy = Recall(replace(SPEC, privileged=True))
-    state = {"bodies": {"can": {"pose": [0.1, 0.2, 0.74, 1.0, 0.0, 0.0, 0.0]}}, "contacts": []}
-    with begun(start(policy)) as remote:
-        remote.infer(observation(privileged=state))
-    assert json.dumps(policy.seen[0]["privileged"]) == json.dumps(state)
 
 
 @pytest.mark.parametrize(
@@ -271,7 +261,7 @@ def test_requests_that_wait_together_become_one_call(start: Any) -> None:
         first = pool.submit(remotes[0].infer, observation(0))
         assert policy.started.wait(10)
         rest = [pool.submit(remotes[n].infer, observation(n)) for n in (1, 2, 3)]
-        until(lambda: server.load.waiting == 3)
+        until(lambda: len(server._policies._batcher._pending) == 3)
         policy.open.set()
         assert [future.result(10)[0, 0] for future in (first, *rest)] == [0, 1, 2, 3]
     assert [sorted(batch) for batch in policy.batches] == [[0], [1, 2, 3]]
@@ -288,7 +278,7 @@ def crowd(start: Any, third: Any) -> Any:
         first = pool.submit(remotes[0].infer, observation(0))
         assert policy.started.wait(10)
         second = pool.submit(remotes[1].infer, observation(1))
-        until(lambda: server.load.waiting == 1)
+        until(lambda: len(server._policies._batcher._pending) == 1)
         found = third(pool, remotes[2])
         policy.open.set()
         assert [first.result(10)[0, 0], second.result(10)[0, 0]] == [0, 1]
