@@ -68,13 +68,16 @@ def parse_seeds(text: str | None, embodiment: str = REFERENCE, mode: str = "clea
     """A function (task, level) -> seeds.
 
     Without `text` the accepted seeds of the robot in the scene mode; else a list like
-    `100000-100099` for every variant, or a JSON file: a list, or {task: {level: list}}.
+    `100000-100099` for every variant, a JSON file (a list, or {task: {level: list}}), or a folder
+    of `robospa seeds --out`.
     """
     if text is None:
         return partial(_accepted, embodiment=embodiment, mode=mode)
     if re.fullmatch(r"[\d,\s-]+", text):
         numbers = parse_numbers(text, "seeds")
         return lambda task, level: numbers
+    if Path(text).is_dir():
+        return partial(_listed, Path(text), embodiment=embodiment, mode=mode)
     try:
         data = parse_json(Path(text).read_text())
     except FileNotFoundError as error:
@@ -94,6 +97,20 @@ def parse_seeds(text: str | None, embodiment: str = REFERENCE, mode: str = "clea
         return found
 
     return look_up
+
+
+def _listed(folder: Path, task: str, level: int, embodiment: str, mode: str) -> Sequence[int]:
+    from robospa.harness.seeds.lists import read_levels
+    from robospa.tasks.modes import tangible
+    from robospa.tasks.seeds import ListKey
+
+    path = folder / ListKey(task, level, embodiment, tangible(mode)).file
+    if not (found := read_levels(path).get(level)):
+        raise SettingsError(
+            f"{path} has no list of seeds for level {level}; a folder of seeds is what "
+            "`robospa seeds TASKS --out FOLDER` writes"
+        )
+    return found
 
 
 def _accepted(task: str, level: int, embodiment: str, mode: str) -> Sequence[int]:

@@ -75,7 +75,7 @@ class Selection:
     levels: str = option("1-5", "such as 1,3-5")
     trials: Trials = option(100, "trials per variant")
     seeds: str | None = option(
-        None, "JSON file or 100000-100099; default: the lists of accepted seeds"
+        None, "100000-100099, JSON file or folder; default: the lists of accepted seeds"
     )
     split: str = option(
         "heldout", "instructions: some of heldout, train and indirect, comma separated", SPLITS

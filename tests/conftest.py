@@ -12,10 +12,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, settings
 from xdist.scheduler import LoadFileScheduling
 
 from robospa.harness.running.status import cores
 from robospa.tasks import catalog
+
+# Timing decides no test: a busy machine may be slow at generating examples.
+settings.register_profile("busy", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("busy")
 
 TASKS = re.compile("|".join(sorted(catalog.tasks(), key=len, reverse=True)), re.IGNORECASE)
 

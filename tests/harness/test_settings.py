@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from robospa.harness.cli.eval import evaluate
 from robospa.harness.running.heartbeat import HEARTBEAT_SECONDS
+from robospa.harness.seeds.lists import save
 from robospa.harness.selection import (
     list_trials,
     parse_levels,
@@ -35,6 +36,7 @@ from robospa.harness.settings import (
     updated,
 )
 from robospa.tasks import catalog
+from robospa.tasks.seeds import ListKey
 from robospa.tasks.task import Task
 
 DEFAULTS = EvaluationSettings()
@@ -236,6 +238,15 @@ def test_bad_seed_files_are_named(tmp_path: Path, text: str) -> None:
     path.write_text(text)
     with pytest.raises(SettingsError, match=r"seeds\.json"):
         parse_seeds(str(path))("A", 1)
+
+
+def test_a_folder_of_lists_is_read_as_it_was_written(tmp_path: Path) -> None:
+    save(tmp_path / ListKey("Pick_Blocks_Size", 2, "piper", "clean").file, 2, [100000, 100002])
+    there, elsewhere = (parse_seeds(str(tmp_path), robot) for robot in ("piper", "ur5-wsg"))
+    assert there("Pick_Blocks_Size", 2) == (100000, 100002)
+    for read, level in ((there, 3), (elsewhere, 2)):
+        with pytest.raises(SettingsError, match="has no list of seeds"):
+            read("Pick_Blocks_Size", level)
 
 
 def test_the_first_seeds_of_every_variant() -> None:
