@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 from robospa.results.failures.labels import NAMES, SIMULATED_PER_FILM
 from robospa.results.figures.charts import chance_levels
@@ -37,16 +37,6 @@ from robospa.results.tables import escape_markdown, to_markdown
 from robospa.trial import BASIC, CATEGORIES, CATEGORY_NAMES, DIMENSIONS, METRIC_NAMES
 
 FIGURES = "figures"
-
-
-class LevelPanel(NamedTuple):
-    """Success by level in a category as shapes in a field of 120 x 70: y is 10 for 100 %, 60 for 0.
-    `lines` have the paths of SR, its intervals and SR@1 of each model that has any."""
-
-    category: str
-    title: str
-    lines: tuple[tuple[int, str, str, str], ...]
-    chance: str
 
 
 def page(
@@ -200,8 +190,10 @@ def _rate(metric: str, found: Estimate | None, lack: str) -> dict[str, object]:
     return {"name": name, "value": f"{text} %", "interval": f"95 % interval {interval}", "bar": bar}
 
 
-def panels(models: Sequence[ModelResults]) -> list[LevelPanel]:
-    """Success by level of `models`, a panel a category that any of them has."""
+def panels(models: Sequence[ModelResults]) -> list[dict[str, Any]]:
+    """Success by level of `models`, a panel a category that any of them has: `lines` are, of each
+    model that has any, its number and the paths of SR, its intervals and SR@1, in a field of
+    120 x 70 where y is 10 for 100 %, 60 for 0."""
     made = []
     for category in (*CATEGORIES, *BASIC):
         lines: list[tuple[int, str, str, str]] = []
@@ -216,9 +208,8 @@ def panels(models: Sequence[ModelResults]) -> list[LevelPanel]:
                 paths = (_path({n: 100 * e.value for n, e in one.items()}) for one in (sr, first))
                 lines.append((number, next(paths), "".join(bars), next(paths)))
         if lines:
-            made.append(
-                LevelPanel(category, CATEGORY_NAMES[category], tuple(lines), _path(guessed))
-            )
+            title, chance = CATEGORY_NAMES[category], _path(guessed)
+            made.append({"category": category, "title": title, "lines": lines, "chance": chance})
     return made
 
 

@@ -130,20 +130,18 @@ def _tables(own: Sequence[ModelResults], columns: Sequence[Column]) -> list[Repo
     made = []
     for track, members in tracks.items():
         mine = [column for column in columns if column.results in members]
-        for one in _track_tables([model for model in own if model in members], mine):
+        runs = [model for model in own if model in members]
+        axes = [table for metric in ("sr", "sr1") if (table := by_axis(runs, metric))]
+        beside = [table for make in BESIDE if (table := make(runs))]
+        ours = [ReportTable(table, table.name == "comparable") for table in beside]
+        first = [ReportTable(table, False) for table in axes]
+        for one in (*first, *report_tables(mine), *ours):
             table = one.table
             if len(tracks) > 1:
                 title = f"{table.title}, track {track}"
                 table = replace(table, name=f"{track}-{table.name}", title=title)
             made.append(ReportTable(table, one.folded))
     return made
-
-
-def _track_tables(own: Sequence[ModelResults], columns: Sequence[Column]) -> list[ReportTable]:
-    axes = [table for metric in ("sr", "sr1") if (table := by_axis(own, metric))]
-    beside = [table for made in BESIDE if (table := made(own))]
-    ours = [ReportTable(table, table.name == "comparable") for table in beside]
-    return [*(ReportTable(table, False) for table in axes), *report_tables(columns), *ours]
 
 
 def banners(models: Sequence[ModelResults]) -> list[str]:
@@ -262,7 +260,12 @@ def report_tables(columns: Sequence[Column]) -> list[ReportTable]:
     runs = [c for c in columns if not c.published] or list(columns)
     levels = sorted({level for c in runs for _, level in c.scores.cells})
     made = []
-    shown = {m: _beside(columns, runs, m) for m in METRICS if any(_has(c, m) for c in runs)}
+    cells = [cell for column in runs for cell in column.scores.cells.values()]
+    shown = {
+        m: _beside(columns, runs, m)
+        for m in METRICS
+        if any(c.category in METRIC_CATEGORIES[m] and m in c.samples for c in cells)
+    }
     for metric, beside in shown.items():
         heads, name = _heads(beside, levels, metric), "main" if metric == "sr" else metric
         table = summary_table(beside, name, metric, heads, covering=runs)
@@ -273,12 +276,6 @@ def report_tables(columns: Sequence[Column]) -> list[ReportTable]:
         table = task_table(beside, f"{metric}-tasks", metric, covering=runs)
         made.append(ReportTable(table, len(table.rows) > MOST_OPEN_ROWS))
     return [one for one in made if any(line.cells for line in one.table.rows)]
-
-
-def _has(column: Column, metric: str) -> bool:
-    categories = METRIC_CATEGORIES[metric]
-    cells = column.scores.cells.values()
-    return any(cell.category in categories and metric in cell.samples for cell in cells)
 
 
 def _beside(columns: Sequence[Column], runs: Sequence[Column], metric: str) -> Sequence[Column]:

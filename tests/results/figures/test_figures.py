@@ -76,8 +76,7 @@ def test_beside_a_run_published_models_get_no_heat_map(tmp_path: Path) -> None:
 
 def test_the_same_data_in_any_order_make_the_same_bytes(drawn: Path, tmp_path: Path) -> None:
     one = small_run()
-    made = [d.name for d in draw([replace(one, records=one.records[::-1])], tmp_path)]
-    assert made == ["success", "progress", "latency", "failures", "heat"]
+    draw([replace(one, records=one.records[::-1])], tmp_path)
     for path in drawn.iterdir():
         assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
 

@@ -121,9 +121,9 @@ def test_of_one_trial_a_cell_no_whiskers_are_drawn(tmp_path: Path) -> None:
         records = [shown("Pick_Blocks_Size", n, s, s > 0) for n in (1, 2) for s in range(trials)]
         run = make_run(tmp_path / str(trials), records)
         (found[trials],) = panels(make_report(run).models)
-    ((_, line, none, first),) = found[1].lines
+    ((_, line, none, first),) = found[1]["lines"]
     assert (line, first, none) == ("M10 60.0L35 60.0", "M10 60.0L35 60.0", "")
-    assert found[3].lines[0][2].count("V") == 2 and found[1].category == "GAC"
+    assert found[3]["lines"][0][2].count("V") == 2 and found[1]["category"] == "GAC"
 
 
 def test_variants_that_lack_trials_are_counted_without_the_reasons(tmp_path: Path) -> None:

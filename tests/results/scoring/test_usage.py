@@ -30,8 +30,5 @@ def test_a_run_sums_what_its_trials_have_used_and_plans_with_it(tmp_path: Any) -
     done = robospa("compare", made.folder, "--power", "--tasks", "GAC", "--json")
     costs = json.loads(done.out)["costs"]
     assert len(costs) == 3 and "like these 11: " in costs[0]
-
-
-def test_a_run_of_another_policy_has_no_such_table(tmp_path: Any) -> None:
-    made = make_run(tmp_path / "run", [record(1)])
-    assert usage_table([results_of_run(load_run(made.folder))]) is None
+    other = make_run(tmp_path / "other", [record(1)])
+    assert usage_table([results_of_run(load_run(other.folder))]) is None
