@@ -19,17 +19,15 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import metadata
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
+from robospa.protocol.client import WireClient
 from robospa.protocol.codec import DEFAULT_LIMITS, Limits
 from robospa.protocol.errors import HandshakeError, WireError
 from robospa.protocol.options import plain_options
 from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.transport import Address, Timeouts, Transport
 from robospa.registry import DIALECTS, UnknownName, load
-
-if TYPE_CHECKING:
-    from robospa.protocol.client import WireClient
 
 TLS_PORT = 443
 Answer = tuple[object, Mapping[str, float]]

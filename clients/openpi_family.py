@@ -451,10 +451,7 @@ def open_ours(params: ConnectionParams, options: FamilyOptions) -> WireClient:
     out to speak openpi's: ours tells everything."""
     address, timeouts, limits = params.websocket_address(), params.timeouts, params.limits
     connect = partial(Transport, address, timeouts, limits, None)
-
-    def other(transport: Transport) -> FamilySession:
-        return FamilySession(connect, options, params, transport=transport)
-
+    other = partial(FamilySession, connect, options, params, "openpi")
     return open_wire(address, timeouts, limits, other)
 
 

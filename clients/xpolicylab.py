@@ -62,25 +62,19 @@ def read_actions(answer: object, seen: Mapping[str, NDArray[np.float32]], space:
     if isinstance(answer, Mapping):
         answer = [answer]
     if isinstance(answer, list) and any(isinstance(item, Mapping) for item in answer):
-        return _from_maps(answer, dict(seen), space)
+        parts = [f"{arm}_{part}" for arm in ARMS for part in (BODIES[space], "ee_joint_state")]
+        last, rows = dict(seen), []
+        for action in answer:
+            found = _named(action, space)
+            for part in parts:
+                if part in found:
+                    last[part] = _numbers(part, found[part], len(last[part]))
+            rows.append(np.concatenate([last[part] for part in parts]))
+        return np.stack(rows)
     chunk = as_chunk(answer)
     if isinstance(chunk, np.ndarray) and chunk.ndim == 1 and len(chunk):
         chunk = chunk[None]  # one action
     return chunk
-
-
-def _from_maps(
-    actions: list[object], last: dict[str, NDArray[np.float32]], space: str
-) -> NDArray[np.float32]:
-    parts = [f"{arm}_{part}" for arm in ARMS for part in (BODIES[space], "ee_joint_state")]
-    rows = []
-    for action in actions:
-        found = _named(action, space)
-        for part in parts:
-            if part in found:
-                last[part] = _numbers(part, found[part], len(last[part]))
-        rows.append(np.concatenate([last[part] for part in parts]))
-    return np.stack(rows)
 
 
 def _named(action: object, space: str) -> dict[str, object]:

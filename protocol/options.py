@@ -71,17 +71,13 @@ def check_ranges(options: object) -> None:
             continue
         rules = [rule for kind in _alternatives(hint) for rule in getattr(kind, "__metadata__", ())]
         bounds = next((r for r in rules if isinstance(r, msgspec.Meta)), msgspec.Meta())
-        finite = isinstance(value, int) or math.isfinite(value)
-        if not (finite and _within(value, bounds)):
+        within = (
+            (bounds.ge is None or value >= bounds.ge)
+            and (bounds.gt is None or value > bounds.gt)
+            and (bounds.le is None or value <= bounds.le)
+        )
+        if not within or (isinstance(value, float) and not math.isfinite(value)):
             raise ValueError(f"{name} is {str(value)[:40]}, and must be {_range(bounds)}")
-
-
-def _within(value: float, bounds: msgspec.Meta) -> bool:
-    return (
-        (bounds.ge is None or value >= bounds.ge)
-        and (bounds.gt is None or value > bounds.gt)
-        and (bounds.le is None or value <= bounds.le)
-    )
 
 
 def _range(bounds: msgspec.Meta) -> str:
@@ -107,13 +103,11 @@ def url_options(query: str) -> dict[str, str]:
 
 def plain_options(options: Any) -> dict[str, Any]:
     """All options as JSON values, the defaults too."""
-    return {name: _plain(value) for name, value in dataclasses.asdict(options).items()}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, tuple):
-        return list(value)
-    return str(value) if isinstance(value, Path) else value
+    found = dataclasses.asdict(options)
+    for name, value in found.items():
+        if isinstance(value, tuple | Path):
+            found[name] = list(value) if isinstance(value, tuple) else str(value)
+    return found
 
 
 def option_table(cls: type[Any]) -> list[OptionRow]:

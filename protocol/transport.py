@@ -47,10 +47,6 @@ MOVED = (301, 302, 303, 307, 308)
 """Statuses with which an HTTP server sends a client to another address."""
 
 
-class BadAddress(ValueError):
-    """The URL cannot be that of a policy server."""
-
-
 @dataclass(frozen=True)
 class Timeouts:
     """Deadlines in seconds. `wait`: how long to keep trying while nobody listens or the server
@@ -269,7 +265,11 @@ def refuse_tls(url: str, error: Exception) -> None:
 def _open(
     address: Address, timeouts: Timeouts, limits: Limits, offer: str | None
 ) -> tuple[ClientConnection, str]:
-    """The connection, and the address where it was made in the end."""
+    """The connection, and the address where it was made in the end; ValueError for one of another
+    form."""
+    parts, shown = urlsplit(address.url), errors.without_secrets(address.url)
+    if parts.scheme not in ("ws", "wss") or not parts.hostname or "@" in parts.netloc:
+        raise ValueError(f"{shown!r} is not of the form ws://host:port or wss://host:port")
     for _ in range(1 + REDIRECTS):
         attempt = partial(_attempt, address, timeouts, limits, offer)
         try:
@@ -285,7 +285,7 @@ def _attempt(
     """One handshake, whose failures are errors of ours."""
     try:
         return _open_once(address, timeouts, limits, offer)
-    except (ConnectionRefusedError, BadAddress):
+    except ConnectionRefusedError:
         raise
     except InvalidStatus as error:
         refused = _refused(address, error)
@@ -336,13 +336,8 @@ def _hung_up(error: Exception) -> bool:
 def _open_once(
     address: Address, timeouts: Timeouts, limits: Limits, offer: str | None
 ) -> ClientConnection:
-    parts = urlsplit(address.url)
-    if parts.scheme not in ("ws", "wss") or not parts.hostname or "@" in parts.netloc:
-        raise BadAddress(
-            f"{errors.without_secrets(address.url)!r} is not of the form ws://host:port or wss://host:port"
-        )
-    sock = None
-    if is_loopback(parts.hostname):
+    parts, sock = urlsplit(address.url), None
+    if parts.hostname and is_loopback(parts.hostname):
         # Own socket: no detour through a proxy that the environment names, and buffers that
         # are set before the connection exists (the kernel scales its window by them).
         port = parts.port or (443 if parts.scheme == "wss" else 80)

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from run_fakes import SPEC, FakePolicy
 from standins import QUICK, answered
 from standins_http import Go1, Status, joint_chunk, observation
 from wire_helpers import port_that
@@ -31,7 +30,6 @@ from robospa.clients.robotwin import robotwin_observation
 from robospa.clients.xpolicylab import XPolicyLabClientOptions, decode, robot_state
 from robospa.protocol.errors import CallTimeout, HandshakeError, TransportError
 from robospa.protocol.options import option_table, plain_options, read_options, url_options
-from robospa.protocol.server import ServerThread
 from robospa.protocol.transport import Timeouts
 
 
@@ -195,20 +193,6 @@ def test_a_page_lists_every_option(dialect: Dialect) -> None:
     assert any(own in page.read_text() for page in pages), (
         f"no page has the options of {dialect.scheme}; the table must be:\n{own}"
     )
-
-
-@pytest.mark.parametrize(("scheme", "dialect"), [("ws", "robospa.v1"), ("openpi", "openpi")])
-def test_the_scheme_chooses_the_dialect(scheme: str, dialect: str) -> None:
-    with ServerThread(policy_factory=FakePolicy) as server:
-        policy = connect(server.url.replace("ws://", f"{scheme}://"))
-        policy.close()
-    spec = policy.spec
-    assert policy.dialect == dialect
-    if scheme == "ws":
-        assert spec == SPEC
-    else:
-        assert (spec.horizon, spec.text_budget) == (None, 150)
-        assert [camera.name for camera in spec.cameras] == ["head", "left_wrist", "right_wrist"]
 
 
 @pytest.mark.parametrize("url", ["grpc://gpu:8080", "lerobot://gpu", "being-h://gpu:5555"])

@@ -52,7 +52,8 @@ def test_openpi_is_sent_what_its_server_reads(scheme: str) -> None:
         policy.reset(TRIAL)
         chunk = policy.infer(observation())
         assert policy.hello["metadata"] == {"reset_pose": [0, -1.5, 1.5, 0, 0, 0]}
-        assert policy.last_timing["infer_ms"] == 12.5
+        assert policy.last_timing["infer_ms"] == 12.5 and policy.dialect == "openpi"
+        assert (policy.spec.horizon, policy.spec.text_budget) == (None, 150)
         assert any("adapt_to_pi" in text for text in policy.hello["warnings"])
     sent = server.requests[0]
     assert sent.keys() == {"images", "state", "prompt"}
