@@ -243,18 +243,17 @@ def explain_error(error: WireError, params: ConnectionParams) -> WireError:
     found = detect(params)
     if found is None:
         return error
-    spoken, advice = endpoint.dialect, ""
+    spoken, looks = endpoint.dialect, found
     if isinstance(found, str):
         fits = found == WEBSOCKET and spoken.wire == "websocket"
     else:
         fits = found.scheme in (spoken.scheme, *spoken.also_reaches)
         scheme = found.secure_scheme if endpoint.secure and found.secure_scheme else found.scheme
         why = f", because {found.sign}" if found.sign else ""
-        advice = f"; try {scheme}://{endpoint.authority}{why}"
+        looks = f"{found.server}; try {scheme}://{endpoint.authority}{why}"
     if fits:
         return error
-    server = found if isinstance(found, str) else found.server
-    explanation = HandshakeError(f"{endpoint.url} looks like {server}{advice} ({error})")
+    explanation = HandshakeError(f"{endpoint.url} looks like {looks} ({error})")
     explanation.__cause__ = error
     return explanation
 

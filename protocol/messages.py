@@ -12,7 +12,7 @@ versions may add some), missing fields and wrong types are refused with DecodeEr
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, get_args
 
 import numpy as np
 from msgspec import Meta
@@ -140,9 +140,7 @@ class _Step:
 
 
 Message = Hello | Reset | Ready | Infer | Actions | Calls | Error | End | Ended
-TYPES: dict[str, type[Message]] = {
-    kind.type: kind for kind in (Hello, Reset, Ready, Infer, Actions, Calls, Error, End, Ended)
-}
+TYPES: dict[str, type[Message]] = {kind.type: kind for kind in get_args(Message)}
 
 
 def pack(message: Message, limits: Limits = DEFAULT_LIMITS) -> bytes:
