@@ -25,6 +25,7 @@ from robospa.action_space import quantize
 from robospa.harness.trial import actions_digest
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import BundleError
+from robospa.leaderboard.evidence import check_challenge
 from robospa.leaderboard.packing import pack
 from robospa.leaderboard.replay import SampleReplay, judge, replay
 from robospa.leaderboard.rules import Reference, manifest_of
@@ -164,3 +165,9 @@ def test_skills_are_verified_and_replayed_as_the_joints_they_became(tmp_path: Pa
 def test_points_move_nothing_and_enter_no_board(tmp_path: Path) -> None:
     with pytest.raises(BundleError, match="'action' must be one of joint, ee, delta_ee, skill, n"):
         in_track(tmp_path, "point")
+
+
+def test_a_challenge_that_can_be_guessed_is_refused() -> None:
+    check_challenge("12345678")
+    with pytest.raises(BundleError, match="challenge"):
+        check_challenge(" 1234567 ")
