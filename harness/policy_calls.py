@@ -61,7 +61,8 @@ class Stopwatch:
 def answer_times(
     latencies: list[float], server_timings: list[Mapping[str, float]]
 ) -> dict[str, float]:
-    """Percentiles as the client measured them, and means of what a server reported [ms]."""
+    """Percentiles as the client measured them, and means of what a server reported, to a
+    microsecond [ms]."""
     if not latencies:
         return {}
     p50, p95, p99 = (float(v) for v in np.percentile(latencies, [50, 95, 99]))
@@ -71,7 +72,7 @@ def answer_times(
         usable = [v for v in values if isinstance(v, (int, float)) and 0.0 <= v < 1e9]
         if usable:
             found[name] = sum(usable) / len(usable)
-    return found
+    return {name: round(value, 3) for name, value in found.items()}
 
 
 @dataclass(frozen=True)
