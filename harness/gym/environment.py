@@ -111,7 +111,12 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.max_steps = step_limit(found, level, step_scale)
         self._key = TrialKey(found.name, level, 0, embodiment, mode, split)
         robot = robot_named(embodiment)
-        box = action_space(robot, self.spec_of_policy.action)
+        box = action_space(robot, kind := self.spec_of_policy.action)
+        if self.spec_of_policy.action_dim not in (None, *box.shape):
+            raise SettingsError(
+                f"the spec has action_dim {self.spec_of_policy.action_dim}, but a {kind} action of "
+                f"{embodiment} has {box.shape[0]} numbers: leave it out"
+            )
         self.action_space = box  # type: ignore[assignment]
         self.observation_space = observation_space(self.spec_of_policy, robot, self.max_steps)
         self._seeds = seeds

@@ -346,6 +346,13 @@ class _OfficialKind(SapienKind):
         if simulation.parts is not None:
             raise SettingsError("parts has scenes and sentences of its own: leave it out")
         use_archive(simulation)
+        if simulation.assets is not None and simulation.robot_assets == "builtin":
+            options, _ = parse_official(simulation.world, named=True)
+            if options.assets == "builtin":
+                raise SettingsError(
+                    f"--world {simulation.world} uses nothing of the folder {simulation.assets}: "
+                    "leave out --assets, or its option assets"
+                )
 
     def arguments(self, settings: EvaluationSettings) -> dict[str, object]:
         simulation = settings.simulation

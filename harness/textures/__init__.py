@@ -195,10 +195,12 @@ class TextureFolder:
 
 
 def _numbered(folder: Path) -> list[Path]:
-    """The images of a split in the order of their numbers."""
+    """The images of a split in the order of their numbers; what macOS writes beside a file when it
+    copies it, such as ._0.png, is none."""
     if not folder.is_dir():
         return []
-    files = [file for file in folder.iterdir() if file.suffix.lower() in ENDINGS]
+    images = (file for file in folder.iterdir() if file.suffix.lower() in ENDINGS)
+    files = [file for file in images if not file.name.startswith("._")]
     for file in files:
         if not (file.stem.isascii() and file.stem.isdigit()):
             raise PackError(

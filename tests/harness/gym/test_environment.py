@@ -123,6 +123,7 @@ def test_spaces_are_those_of_the_spec() -> None:
         ({"seeds": []}, "one or more whole numbers"),
         ({"spec": PolicySpec("x", history=(-1,))}, "gives no history"),
         ({"spec": PolicySpec("x", privileged=True)}, "gives no privileged state"),
+        ({"spec": PolicySpec("x", action_dim=7)}, "joint action of aloha-agilex has 14"),
         ({"render_mode": "human"}, "not rgb_array or None"),
     ],
 )

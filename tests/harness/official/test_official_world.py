@@ -90,8 +90,9 @@ def test_the_archive_that_is_named_is_found_by_workers_with_its_textures(cans: P
     assert made.config.parts_arguments["layout"].digest
     assert os.environ["ROBOSPA_ASSETS"] == str(cans)
     assert os.environ["ROBOSPA_TEXTURES"] == str(cans / "background_texture")
-    with pytest.raises(SettingsError, match="--world official"):
-        request(cans, assets=str(cans), world="sapien")
+    for world in ("sapien", "official?assets=builtin"):
+        with pytest.raises(SettingsError, match="--world official"):
+            request(cans, assets=str(cans), world=world)
     with pytest.raises(SettingsError, match="there is no folder"):
         request(cans, assets=str(cans / "no"))
     with pytest.raises(SettingsError, match="holds none of objects"):

@@ -85,6 +85,7 @@ def test_a_folder_of_own_textures_goes_by_numbers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(textures.VARIABLE, str(folder(tmp_path, unseen=(2, 10, 1))))
+    (tmp_path / "unseen" / "._2.png").write_bytes(b"attributes of 2.png")
     own = source()
     levels = [int(own.image(Texture(UNSEEN, index))[0, 0, 0]) for index in range(4)]
     assert levels == [1, 2, 10, 1]
