@@ -22,11 +22,10 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from robospa.baselines.learned.act import the_bin
 from robospa.baselines.learned.scenes import middle_pixel
-from robospa.baselines.learned.steps import KINDS, Seen, model, seen_at, table_top
+from robospa.baselines.learned.steps import KINDS, Seen, model, table_top
 from robospa.harness.running.atomic_file import replace_file
-from robospa.tasks.families.dustbin import BIN
-from robospa.tasks.objects import object_model
 from robospa.workcell import HEIGHT, TABLE_TOP, WIDTH, WORKCELL
 
 CELL = 8
@@ -161,11 +160,11 @@ def seen_of(numbers: NDArray[np.float64], pixels: NDArray[np.float64]) -> list[S
     """What the measuring network says (K, NUMBERS + KINDS) of pixels (K, 2), as objects."""
     places = table_place(pixels) + numbers[:, :2] * UNIT
     found = []
-    bin_seen = seen_at("dustbin", object_model("dustbin", {"look": 0}), BIN)
+    bin_seen = the_bin()
     for row, (x, y) in zip(numbers, places, strict=True):
         a, b, c = (float(h) for h in 0.03 * np.exp(row[3:6]))
         kind, next_kind = (KINDS[int(k)] for k in np.argsort(-row[NUMBERS:])[:2])
-        if kind == "dustbin":  # it always stands at the same place, and only its rim is in view
+        if kind == "dustbin":
             found.append(bin_seen)
             continue
         size = model(Seen(kind, (0.0, 0.0, 0.0), (a, b, c), 0.0, (0.0, 0.0, 0.0))).size

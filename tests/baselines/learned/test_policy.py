@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robospa.baselines.learned.act import Belief, possible, told
+from robospa.baselines.learned.act import Belief, furnished, possible, told
 from robospa.baselines.learned.policy import Learned, LearnedCalls, LearnedOptions, Learners
 from robospa.baselines.learned.steps import Seen, State, Step, Tracked, is_wall, labelled
 from robospa.harness.robots import embodiment
@@ -165,6 +165,15 @@ def test_a_stand_and_a_wall_are_known_by_what_they_carry_and_hide() -> None:
     stand, _, _, wall = (o.now for o in belief.state.objects)
     assert stand.place[2] + 2 * stand.half[2] == pytest.approx(0.83) and is_wall(wall)
     assert [o.visible for o in belief.state.objects] == [False, True, False, True]
+
+
+def test_bottles_among_cups_stand_beside_a_bin() -> None:
+    bottle = Seen("bottle", (0.2, 0.1, 0.74), (0.03, 0.03, 0.1), 0.0, (0.0, 1.0, 0.0))
+    kinds = [one.kind for one in furnished([bottle, replace(bottle, kind="cup")])]
+    assert kinds == ["bottle", "cup", "dustbin"]
+    for other in ("dustbin", "can"):
+        seen = [bottle, replace(bottle, kind=other)]
+        assert furnished(seen) == seen
 
 
 def test_what_is_hidden_below_the_table_cannot_be_acted_on() -> None:
