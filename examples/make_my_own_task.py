@@ -17,7 +17,7 @@ from robospa.harness.factory import policy_factory
 from robospa.harness.pictures.gallery import first_frame, save
 from robospa.harness.seeds.attempt import ORACLE, attempt
 from robospa.harness.sim.sapien_world import SapienWorld
-from robospa.registry import load
+from robospa.registry import UnknownName, load
 from robospa.tasks.catalog import build_scene, offer
 from robospa.tasks.seeds import ListKey
 from robospa.tasks.sentences import instruction
@@ -35,8 +35,11 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--out", default=None, help="PNG file of the first scene")
     words = parser.parse_args()
-    task = load(words.task)
-    offer(task)  # from now on this process knows it by its name
+    try:
+        offer(task := load(words.task))  # from now on this process knows it by its name
+        build_scene(task.name, words.level, words.first)
+    except (UnknownName, ValueError) as error:
+        parser.error(str(error))
 
     world, expert = SapienWorld(), policy_factory(ORACLE)()
     solved = 0

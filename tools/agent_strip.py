@@ -50,6 +50,8 @@ def main(source: str, out: str) -> None:
     path = Path(source)
     lines = [json.loads(line) for line in path.read_text().splitlines()]
     lines = [line for line in lines if not line["error"]]  # those whose answers were used
+    if not lines:
+        sys.exit(f"{source} notes down no answer that was used: draw another trial")
     texts = "\n".join(map(str, lines[-1]["question"]))
     known = [row.partition(". ")[2] for row in texts.splitlines() if row[:1].isdigit()]
     feedback = {n: str(json.loads(row)["feedback"]) for n, row in enumerate(known)}
@@ -62,4 +64,6 @@ def main(source: str, out: str) -> None:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 3 or not Path(sys.argv[1]).is_file():
+        sys.exit("name a trial that was noted down, and a picture: FOLDER/TRIAL.jsonl OUT.png")
     main(*sys.argv[1:])

@@ -85,7 +85,7 @@ def schema(made_by: str) -> pa.Schema:
     columns = {
         **dict.fromkeys(("id", "task", "category"), pa.string()),
         "level": pa.int32(), "seed": pa.int64(),
-        **dict.fromkeys(("mode", "wording", "sentence"), pa.string()),
+        **dict.fromkeys(("embodiment", "mode", "wording", "sentence"), pa.string()),
         "image": image, "point": pa.list_(pa.float64()), "box": box, "mask": image,
         "boxes": pa.list_(box), "answer": pa.int32(),
     }  # fmt: skip
@@ -95,8 +95,8 @@ def schema(made_by: str) -> pa.Schema:
 
 
 COLUMNS = {
-    "id": "task, level, seed and scene mode, which `task`, `level`, `seed` and `mode` have too, "
-    f"and the robot, if it is not {REFERENCE}",
+    "id": "task, level, seed, scene mode and, unless it is the default, robot, which `task`, "
+    "`level`, `seed`, `mode` and `embodiment` have too",
     "category": "of the task, such as GAC",
     "wording": "of the sentence: train or heldout, in words that are for evaluation",
     "sentence": "what is asked for",
@@ -205,6 +205,7 @@ def _row(
         "category": setup.task.category,
         "level": trial.level,
         "seed": trial.seed,
+        "embodiment": trial.embodiment,
         "mode": trial.mode,
         "wording": trial.split,
         "sentence": setup.instruction,

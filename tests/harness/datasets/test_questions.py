@@ -54,8 +54,9 @@ def test_questions_say_what_their_pictures_show_and_where(tmp_path: Path) -> Non
 def test_questions_of_two_robots_have_ids_of_their_own(tmp_path: Path) -> None:
     settings = Collection("Pick_Blocks_Size", "1", 1, embodiment="aloha-agilex,piper")
     collect_questions(settings, tmp_path, 1, str)
-    ids = pandas.read_parquet(tmp_path / "data/test-Pick_Blocks_Size.parquet").id
-    assert list(ids) == [f"Pick_Blocks_Size-L1-100000-clean{robot}" for robot in ("", "-piper")]
+    test = pandas.read_parquet(tmp_path / "data/test-Pick_Blocks_Size.parquet")
+    assert list(test.embodiment) == ["aloha-agilex", "piper"]
+    assert list(test.id) == [f"Pick_Blocks_Size-L1-100000-clean{robot}" for robot in ("", "-piper")]
 
 
 def test_procedures_ask_for_more_than_a_point(tmp_path: Path) -> None:
